@@ -55,6 +55,8 @@ pub(super) struct PixelAxis<'a> {
     pub(super) ends: [f64; 2],
     /// Whether only whole numbers are places.
     pub(super) whole: bool,
+    /// How many times as large numbers, name and strokes are as usual.
+    pub(super) times: i32,
 }
 
 /// The least distance between the numbers of an axis, across and up, in pixels.
@@ -65,33 +67,35 @@ const NAME_LEFT: i32 = 68;
 impl PixelAxis<'_> {
     /// Draws the line, numbers and the name.
     pub(super) fn draw<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
-        let Self { name, line: [from, to], ends: [start, end], whole } = *self;
-        area.draw(&PathElement::new([from, to], GRAY_INK))?;
+        let Self { name, line: [from, to], ends: [start, end], whole, times } = *self;
+        let stroke_style = GRAY_INK.stroke_width(times as u32);
+        area.draw(&PathElement::new([from, to], stroke_style))?;
+        let letters = |size: f64| text(area, size * f64::from(times));
         let is_up = from.0 == to.0;
         let mut ticks = ticks(&(start.min(end)..start.max(end)), false);
         ticks.retain(|tick| !whole || tick.fract() == 0.0);
         let length = f64::from((to.0 - from.0).abs() + (to.1 - from.1).abs());
-        let most = (length / f64::from(TICKS_APART[usize::from(is_up)])).max(1.0) as usize;
+        let most = (length / f64::from(times * TICKS_APART[usize::from(is_up)])).max(1.0) as usize;
         let every = ticks.len().div_ceil(most).max(1);
         for tick in ticks.into_iter().step_by(every) {
             let share = (tick - start) / (end - start);
             let along = |from: i32, to: i32| from + (share * f64::from(to - from)).round() as i32;
             let (x, y) = (along(from.0, to.0), along(from.1, to.1));
             let (stroke, label, pos) = if is_up {
-                ((x - 6, y), (x - 9, y), Pos::new(HPos::Right, VPos::Center))
+                ((x - 6 * times, y), (x - 9 * times, y), Pos::new(HPos::Right, VPos::Center))
             } else {
-                ((x, y + 6), (x, y + 9), Pos::new(HPos::Center, VPos::Top))
+                ((x, y + 6 * times), (x, y + 9 * times), Pos::new(HPos::Center, VPos::Top))
             };
-            area.draw(&PathElement::new([(x, y), stroke], GRAY_INK))?;
-            area.draw(&Text::new(AxisScale::format(&tick), label, text(area, 15.0).pos(pos)))?;
+            area.draw(&PathElement::new([(x, y), stroke], stroke_style))?;
+            area.draw(&Text::new(AxisScale::format(&tick), label, letters(15.0).pos(pos)))?;
         }
         let middle = (i32::midpoint(from.0, to.0), i32::midpoint(from.1, to.1));
         let pos = Pos::new(HPos::Center, VPos::Top);
         let (place, style) = if is_up {
-            let style = text(area, 16.0).transform(FontTransform::Rotate270);
-            ((middle.0 - NAME_LEFT, middle.1), style.pos(pos))
+            let style = letters(16.0).transform(FontTransform::Rotate270);
+            ((middle.0 - NAME_LEFT * times, middle.1), style.pos(pos))
         } else {
-            ((middle.0, middle.1 + 28), text(area, 16.0).pos(pos))
+            ((middle.0, middle.1 + 28 * times), letters(16.0).pos(pos))
         };
         area.draw(&Text::new(name.to_owned(), place, style))
     }

@@ -101,12 +101,22 @@ impl DoseMap {
         };
         let below = top + height;
         let line = [(left, below), (left + width, below)];
-        let columns =
-            PixelAxis { name: "column", line, ends: ends(self.corner[0], self.width), whole: true };
+        let columns = PixelAxis {
+            name: "column",
+            line,
+            ends: ends(self.corner[0], self.width),
+            whole: true,
+            times: 1,
+        };
         columns.draw(area)?;
         let line = [(left, top), (left, below)];
-        let rows =
-            PixelAxis { name: "row", line, ends: ends(self.corner[1], self.height()), whole: true };
+        let rows = PixelAxis {
+            name: "row",
+            line,
+            ends: ends(self.corner[1], self.height()),
+            whole: true,
+            times: 1,
+        };
         rows.draw(area)
     }
 

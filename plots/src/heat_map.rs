@@ -24,8 +24,8 @@ pub struct HeatMap {
 /// How numbers are colored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colors {
-    /// Blue below zero, red above, as far in both directions. The greatest hundredth of the numbers has
-    /// the colors of the ends, or a few would leave all others pale.
+    /// Blue below zero, red above, as far in both directions: to [`MEDIANS`] times the median distance from
+    /// zero. Numbers beyond have the colors of the ends, or a few would leave all others pale.
     AboutZero,
     /// Dark at zero, light at the most.
     FromZero,
@@ -34,6 +34,10 @@ pub enum Colors {
 /// The longer side of a map, and the most pixels of a square.
 const SIDE: usize = 1000;
 const MOST_PIXELS: usize = 40;
+/// Where colors about zero end, in medians: three standard deviations, if errors are spread normally. The
+/// edge of a part is a ring, whose share of the numbers depends on the part's size. So a fixed share of
+/// the numbers would not leave it out, but the median hardly depends on it.
+const MEDIANS: f64 = 4.5;
 /// The margins of a map, in points: title, axes and the scale.
 const TITLE: u32 = 50;
 const LEFT: u32 = 62;
@@ -105,12 +109,17 @@ impl HeatMap {
         let most = self.most().max(1e-9);
         match self.colors {
             Colors::AboutZero => {
-                let mut sizes: Vec<f64> = self.values.iter().map(|value| value.abs()).collect();
-                // By nearest rank, so that few numbers keep all.
-                let rank = (sizes.len() * 99).div_ceil(100).max(1);
-                let (_, &mut cut, _) = sizes.select_nth_unstable_by(rank - 1, f64::total_cmp);
-                // Few columns may be wrong at all, and their colors must differ.
-                let end = if cut.is_finite() && cut > most / 1000.0 { cut } else { most };
+                // Around a part, nothing is wanted and nothing cures.
+                let sizes = self.values.iter().map(|value| value.abs()).filter(|size| *size != 0.0);
+                let mut sizes: Vec<f64> = sizes.collect();
+                let middle = sizes.len() / 2;
+                let cut = if sizes.is_empty() {
+                    most
+                } else {
+                    MEDIANS * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+                };
+                // Few columns may be wrong by more than a rounding, and their colors must differ.
+                let end = if cut > most / 1000.0 { most.min(cut) } else { most };
                 ColorScale { least: -end, most: end, stops: &DIVERGING }
             }
             Colors::FromZero => ColorScale { least: 0.0, most, stops: &RISING },
@@ -121,7 +130,9 @@ impl HeatMap {
     fn beyond(&self) -> Option<String> {
         let (most, end) = (self.most(), self.scale().most);
         (most > end).then(|| {
-            format!("Colors end where 99 % of the numbers do; the farthest from zero is {most:.3}.")
+            format!(
+                "Colors end at {MEDIANS} times the median distance from zero; the farthest is {most:.3}."
+            )
         })
     }
 
@@ -269,20 +280,37 @@ mod tests {
         assert_eq!(scale.color(-9.0), RGBColor(33, 102, 172));
     }
 
+    /// The colors of the inside of a square of so many columns along a side, around which the numbers of
+    /// two rings are wild, do not depend on its size.
     #[test]
-    fn a_hundredth_of_the_numbers_may_lie_beyond_the_colors_and_a_sentence_says_so() {
-        let numbers = |wild: usize| {
-            let small = (0..1000 - wild).map(|k| 0.5 + 0.5 * (k as f64 * 0.1).sin());
-            let all = small.chain(std::iter::repeat_n(-20.0, wild)).collect();
-            map(50, all, Colors::AboutZero)
-        };
-        assert!((numbers(10).scale().most - 1.0).abs() < 1e-3);
-        assert!(numbers(10).beyond().unwrap().ends_with("is 20.000."));
-        assert_eq!((numbers(11).scale().most, numbers(11).beyond()), (20.0, None));
+    fn a_wild_edge_leaves_colors_to_the_rest_in_maps_of_any_size() {
+        for side in [20_usize, 60, 200] {
+            let number = |place: usize| {
+                let [column, row] = [place % side, place / side];
+                let edge = column.min(row).min(side - 1 - column.max(row));
+                // Evenly from 0 to 1 inside.
+                let inside = (place as f64 * 0.618_034).fract();
+                if edge < 2 { -20.0 } else { inside }
+            };
+            let map = map(side, (0..side * side).map(number).collect(), Colors::AboutZero);
+            let end = map.scale().most;
+            // The median of the inside is 0.5, and at most 36 % are wild.
+            assert!((2.2..3.6).contains(&end), "{side}: {end}");
+            assert!(map.beyond().unwrap().ends_with("the farthest is 20.000."));
+        }
+    }
+
+    #[test]
+    fn numbers_of_one_size_and_rare_ones_have_colors() {
+        let of = |values: Vec<f64>| map(50, values, Colors::AboutZero);
+        let even = of((0..1000).map(|k| (k as f64 * 0.1).sin()).collect());
+        assert!(even.scale().most > 0.99 && even.beyond().is_none());
         // Where nearly all is right, what is wrong has colors.
         let mut rare = vec![0.0; 1000];
         rare[3] = 2.0;
-        assert_eq!(map(50, rare, Colors::AboutZero).scale().most, 2.0);
+        assert_eq!(of(rare.clone()).scale().most, 2.0);
+        rare.iter_mut().filter(|value| **value == 0.0).for_each(|value| *value = 1e-12);
+        assert_eq!(of(rare).scale().most, 2.0);
     }
 
     #[test]
