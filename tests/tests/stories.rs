@@ -41,7 +41,8 @@ fn missing<'a>(patterns: &[&'a str], lines: &[&str]) -> Option<&'a str> {
     (!may_skip && lines.peek().is_some()).then_some("(the end)")
 }
 
-fn happens(name: &str) {
+/// Runs a story in a new folder, and returns the folder.
+fn happens(name: &str) -> Scratch {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("stories").join(name);
     let text = fs::read_to_string(path).unwrap();
     let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
@@ -50,6 +51,8 @@ fn happens(name: &str) {
         if let Some(name) = file[0].strip_prefix("> ") {
             let text: Vec<&str> =
                 file[1..].iter().map(|line| line.strip_prefix("| ").unwrap_or_default()).collect();
+            let folder = Path::new(name).parent().expect("it names a file");
+            fs::create_dir_all(scratch.path(folder.to_str().unwrap())).unwrap();
             scratch.write(name, text.join("\n").as_bytes());
         }
     }
@@ -76,6 +79,7 @@ fn happens(name: &str) {
         commands += 1;
     }
     assert!(commands > 3, "{name}: {commands} commands are no story");
+    scratch
 }
 
 #[test]
@@ -105,8 +109,9 @@ fn every_story_is_a_test() {
     assert_eq!(files, STORIES);
 }
 
-const STORIES: [&str; 7] = [
+const STORIES: [&str; 8] = [
     "another-program.txt",
+    "batch-evening.txt",
     "blade-night.txt",
     "broken-mesh.txt",
     "desktop-printer.txt",
@@ -121,31 +126,40 @@ fn a_stack_from_another_program_is_read() {
 }
 
 #[test]
-fn an_engineer_makes_a_build_of_blades() {
-    happens(STORIES[1]);
+fn parts_are_made_overnight_and_a_changed_one_again() {
+    let scratch = happens(STORIES[1]);
+    let page = String::from_utf8(scratch.bytes("night/report.html")).unwrap();
+    for words in ["Night run: night.toml", "Look at this first", "mug", "1 island"] {
+        assert!(page.contains(words), "{words}");
+    }
 }
 
 #[test]
-fn a_mesh_with_faults_is_mended() {
+fn an_engineer_makes_a_build_of_blades() {
     happens(STORIES[2]);
 }
 
 #[test]
-fn an_owner_of_a_printer_gets_a_file_for_it() {
+fn a_mesh_with_faults_is_mended() {
     happens(STORIES[3]);
 }
 
 #[test]
-fn a_researcher_compares_gray_with_white() {
+fn an_owner_of_a_printer_gets_a_file_for_it() {
     happens(STORIES[4]);
 }
 
 #[test]
-fn a_machine_with_a_scanning_projector_gets_its_job() {
+fn a_researcher_compares_gray_with_white() {
     happens(STORIES[5]);
 }
 
 #[test]
-fn a_designer_brings_a_step_file() {
+fn a_machine_with_a_scanning_projector_gets_its_job() {
     happens(STORIES[6]);
+}
+
+#[test]
+fn a_designer_brings_a_step_file() {
+    happens(STORIES[7]);
 }
