@@ -60,6 +60,7 @@ mod plan_column_cure;
 mod plan_ecpl;
 mod plan_simulate;
 mod plan_speed;
+mod plot_tables;
 mod povray;
 mod printers;
 mod projector;

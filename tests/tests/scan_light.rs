@@ -8,6 +8,8 @@ use lamp_stack::{Image, Layer, Mask, MaskBuilder, PageInfo, Pitch, StackInfo};
 use lamp_tests::{Scratch, mask};
 use serde_json::Value;
 
+use crate::plot_tables::is_as_in_the_book;
+
 const PITCH: f64 = 25_400.0 / 1500.0;
 
 /// The share of a normal distribution below a number of standard deviations, by Simpson's rule.
@@ -126,6 +128,9 @@ fn both_spreads_come_back_from_a_simulated_print() {
     let exact = said(&scratch, calibrate);
     let answer: Value =
         serde_json::from_str(&said(&scratch, &format!("{calibrate} --json"))).unwrap();
+    let again = said(&scratch, "lamp calibrate scan exact.csv --plot lines.csv");
+    assert_eq!(again, exact);
+    is_as_in_the_book(&scratch, "lamp calibrate scan", "lines.csv");
     let names = ["sigma across (um)", "sigma along (um)", "Ec of lines (mJ/cm2)"];
     for (parameter, name) in answer["parameters"].as_array().unwrap().iter().zip(names) {
         let (told, unit) = (&parameter["name"], &parameter["unit"]);
