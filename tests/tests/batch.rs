@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use lamp_fixtures::{Defect, Sample, inject};
 use lamp_tests::{Ran, Scratch, tilted_ball};
+use serde_json::Value;
 
 const STAGES: &str = "slice --dpi 60 --thickness 2mm";
 const TILE: &str = "--area 400x400mm --mesh none";
@@ -225,7 +226,24 @@ fn damaged_results_are_found_and_made_again() {
     assert_eq!(verified.statuses, [Some(1)], "{verified:?}");
     let told = format!("{0} of {0} results were damaged", results.len());
     assert!(verified.stderr.contains(&told), "{verified:?}");
+    let answer = |scratch: &Scratch| -> Value {
+        let ran = scratch.run("lamp batch verify night.toml --json");
+        serde_json::from_slice(&ran.stdout).unwrap()
+    };
+    // Damaged results are removed, and counted no more.
+    let counts = |answer: &Value| {
+        let damaged = answer["damaged"].as_array().unwrap().len();
+        (answer["whole_results"].as_u64().unwrap() as usize, damaged, answer["whole"] == true)
+    };
+    assert_eq!(counts(&answer(&scratch)), (0, 0, true));
     assert_eq!(done(&night(&scratch)).len(), results.len());
+    assert_eq!(counts(&answer(&scratch)), (results.len(), 0, true));
+    let file = stored(&scratch, "result").remove(0);
+    write_over(&file, b"other");
+    let found = answer(&scratch);
+    assert_eq!(counts(&found), (results.len() - 1, 1, false), "{found}");
+    assert_eq!(found["damaged"][0]["removed"], true, "{found}");
+    assert_eq!(night(&scratch).statuses, [Some(0)]);
     // Without verify, a task finds out when it uses one.
     let text = String::from_utf8(scratch.bytes("night.toml")).unwrap();
     let stacks: Vec<_> = stored(&scratch, "result");

@@ -141,7 +141,7 @@ Examples:
     /// Print the state of each part and build
     Status(NightArgs),
     /// Hash all results and delivered files again, and remove damaged results
-    Verify(StoreArgs),
+    Verify(VerifyArgs),
     /// Remove results that no recent batch names
     Gc(GcArgs),
     /// Do one task, as engines call it
@@ -180,6 +180,16 @@ struct StoreArgs {
     /// The store itself
     #[arg(long, value_name = "DIR", conflicts_with = "night")]
     store: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct VerifyArgs {
+    #[command(flatten)]
+    store: StoreArgs,
+
+    /// Print JSON, as docs/json.md describes it
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Args)]
