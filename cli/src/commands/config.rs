@@ -83,7 +83,7 @@ pub(crate) fn run(args: &ConfigArgs, common: &Common) -> Result<(), Exit> {
 struct CommandAnswer<'a> {
     /// The command.
     command: String,
-    /// Its options, those of the first file first.
+    /// Its options, from the first file on.
     options: Vec<CommandOption<'a>>,
 }
 
@@ -117,7 +117,7 @@ pub(crate) struct ConfigAnswer {
 struct OptionsFile {
     /// Its path.
     path: String,
-    /// What names it: `LAMP_OPTIONS`, `the current folder` or `your settings folder`.
+    /// Source of its path: `LAMP_OPTIONS`, `the current folder` or `your settings folder`.
     from: &'static str,
     /// Whether it is there.
     is_there: bool,

@@ -73,7 +73,7 @@ pub(crate) struct CureArgs {
     along: Option<Range<f64>>,
 
     /// Add up the doses of all layers (the default)
-    #[arg(long, conflicts_with = "alone")]
+    #[arg(long, conflicts_with = "alone", hide_short_help = true)]
     add_up: bool,
 
     /// Let each exposure cure by itself, without the doses of others
@@ -205,7 +205,7 @@ struct CureAnswer<'a> {
     areas: Vec<CuredAreas>,
 }
 
-/// What some exposures cure.
+/// The areas that some exposures cure.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 struct CuredAreas {

@@ -101,13 +101,13 @@ struct TriedFolder {
     name: &'static str,
     /// Its path; null if it is not known.
     path: Option<String>,
-    /// What its disk does; null with a fault.
+    /// Properties of its disk; null with a fault.
     disk: Option<TriedDisk>,
-    /// What fails, as a sentence.
+    /// The fault, as a sentence.
     fault: Option<String>,
 }
 
-/// What a disk does.
+/// Properties of a disk.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 struct TriedDisk {
