@@ -24,7 +24,7 @@ pub struct HeatMap {
 /// How numbers are colored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colors {
-    /// Blue below zero, red above, as far in both directions: to [`MEDIANS`] times the median distance from
+    /// Blue below zero, red above, as far in both directions: to 4.5 times the median distance from
     /// zero. Numbers beyond have the colors of the ends, or a few would leave all others pale.
     AboutZero,
     /// Dark at zero, light at the most.
@@ -303,7 +303,7 @@ mod tests {
     #[test]
     fn numbers_of_one_size_and_rare_ones_have_colors() {
         let of = |values: Vec<f64>| map(50, values, Colors::AboutZero);
-        let even = of((0..1000).map(|k| (k as f64 * 0.1).sin()).collect());
+        let even = of((0..1000).map(|k| (f64::from(k) * 0.1).sin()).collect());
         assert!(even.scale().most > 0.99 && even.beyond().is_none());
         // Where nearly all is right, what is wrong has colors.
         let mut rare = vec![0.0; 1000];
