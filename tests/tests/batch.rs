@@ -153,7 +153,7 @@ fn stray_bands_that_are_left_need_a_person() {
     let ran = scratch.run("lamp batch night.toml --notify cat");
     assert_eq!(ran.statuses, [Some(3)], "{ran:?}");
     assert!(
-        ran.stderr.contains("need a person: ball: ") && ran.stderr.contains("stray band"),
+        ran.stderr.contains("1 needs a person: ball: ") && ran.stderr.contains("stray band"),
         "{ran:?}"
     );
     let told = String::from_utf8(ran.stdout).unwrap();

@@ -99,6 +99,9 @@ pub(super) fn make(file: &NightFile, args: &RunArgs, progress: &Progress) -> Res
     summary.add_failures(&failed.collect::<Vec<_>>());
     if is_new || !report::is_written(&report, &store, &summary)? {
         report::write(&report, file, &plan, &store, &summary)?;
+        if args.watch.is_none() {
+            progress.wrote(&report, &[counts(&summary)]);
+        }
     }
     let end = end(&summary, &ledger);
     if let Some(command) = &args.notify {
@@ -214,7 +217,8 @@ fn end(summary: &Summary, ledger: &Ledger<'_>) -> Result<(), Exit> {
             .take(5)
             .map(|line| format!("{}: {}", line.name, line.why.as_deref().unwrap_or_default()));
         let text = text.collect::<Vec<_>>().join("; ");
-        return Err(Exit::Findings(format!("all is done, and {person} need a person: {text}")));
+        let verb = if person == 1 { "needs" } else { "need" };
+        return Err(Exit::Findings(format!("all is done, and {person} {verb} a person: {text}")));
     }
     Ok(())
 }

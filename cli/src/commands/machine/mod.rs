@@ -123,6 +123,7 @@ fn check(files: &[PathBuf], json: bool) -> Result<(), Exit> {
     }
     match faulty {
         0 => Ok(()),
+        1 if all == 1 => Err(Exit::Failed(anyhow!("the machine has a fault"))),
         1 => Err(Exit::Failed(anyhow!("1 of {all} machines has a fault"))),
         _ => Err(Exit::Failed(anyhow!("{faulty} of {all} machines have faults"))),
     }
