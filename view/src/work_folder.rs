@@ -164,7 +164,7 @@ impl WorkFolder {
             else {
                 continue;
             };
-            let Some(name) = name.to_str().filter(|name| self.is_name(name)) else { continue };
+            let Some(name) = name.to_str().filter(|name| is_name(name)) else { continue };
             // Links are followed by no one here: they may lead out of the folder.
             if facts.is_file() && self.workshop.is_input(Path::new(name)) {
                 files.push((name.to_owned(), facts.len()));
@@ -175,20 +175,11 @@ impl WorkFolder {
         Ok(files.into_iter().map(|(name, bytes)| json!({"name": name, "bytes": bytes})).collect())
     }
 
-    /// Returns whether a text is the name of a file, on all systems, and not a hidden one.
-    fn is_name(&self, name: &str) -> bool {
-        let is_plain = |c: char| !c.is_control() && !r#"/\:*?"<>|"#.contains(c);
-        (1..=LONGEST_NAME).contains(&name.len())
-            && name.chars().all(is_plain)
-            && !name.starts_with(['.', '-', ' '])
-            && !name.ends_with(['.', ' '])
-    }
-
     /// Returns the path of a file in the folder.
     fn path_of(&self, name: &str) -> Result<PathBuf, ViewError> {
         let path = self.folder.join(name);
         let is_file = || fs::symlink_metadata(&path).is_ok_and(|facts| facts.is_file());
-        if self.is_name(name) && is_file() { Ok(path) } else { Err(ViewError::NoSuch("file")) }
+        if is_name(name) && is_file() { Ok(path) } else { Err(ViewError::NoSuch("file")) }
     }
 
     /// Opens a file of the folder, to send it.
@@ -204,7 +195,7 @@ impl WorkFolder {
         bytes: impl Read,
         replace: bool,
     ) -> Result<(), ViewError> {
-        if !self.is_name(name) {
+        if !is_name(name) {
             return Err(ViewError::Malformed("this is no name of a file on all systems"));
         }
         if !self.workshop.is_input(Path::new(name)) {
@@ -318,6 +309,15 @@ impl WorkFolder {
         // It is replaced whole, so it is valid even after a panic.
         self.job.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Returns whether a text is the name of a file, on all systems, and not a hidden one.
+fn is_name(name: &str) -> bool {
+    let is_plain = |c: char| !c.is_control() && !r#"/\:*?"<>|"#.contains(c);
+    (1..=LONGEST_NAME).contains(&name.len())
+        && name.chars().all(is_plain)
+        && !name.starts_with(['.', '-', ' '])
+        && !name.ends_with(['.', ' '])
 }
 
 /// Copies all bytes to a file.

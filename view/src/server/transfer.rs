@@ -46,7 +46,7 @@ pub(super) async fn keep(
             Ok(Some(Err(_))) | Err(_) => break,
         };
         let is_end = piece == Some(None);
-        // What is refused is read to its end all the same: a browser sees no answer before.
+        // A refused file is read to its end all the same: a browser sees no answer before.
         if let Some(piece) = piece {
             let _ = pieces.send(piece).await;
         }

@@ -52,7 +52,7 @@ struct Sliced {
     stack: FileState,
 }
 
-/// What changes when a file does.
+/// The size and time of a file, which change when the file does.
 type FileState = (u64, SystemTime);
 
 impl Workshop for Chain {
