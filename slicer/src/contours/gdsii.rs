@@ -10,6 +10,7 @@ use lamp_stack::one_line;
 
 use super::curves::chords_of_arc;
 use super::error::ContourFault;
+use super::rows::{IDENTITY, Rows, at, placed, sin_cos};
 use super::{Located, Opened, Pages};
 use crate::fill::Fill;
 use crate::prisms::Ring;
@@ -401,15 +402,6 @@ fn shown(cell: &str) -> String {
     format!("cell {name}")
 }
 
-/// Sums of x, y and 1.
-type Rows = [[f64; 3]; 2];
-
-const IDENTITY: Rows = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-
-fn at(rows: &Rows, [x, y]: [f64; 2]) -> [f64; 2] {
-    rows.map(|row| row[0] * x + row[1] * y + row[2])
-}
-
 /// The masks of a library, with all cells in their places.
 struct Flat<'a> {
     cells: &'a [Cell],
@@ -474,12 +466,7 @@ impl Flat<'_> {
                             + f64::from(row) * up[axis]
                     });
                     let own = [0, 1].map(|axis| [turned[axis][0], turned[axis][1], moved[axis]]);
-                    let placed = rows.map(|[a, b, c]| {
-                        let mut sum: [f64; 3] =
-                            std::array::from_fn(|k| a * own[0][k] + b * own[1][k]);
-                        sum[2] += c;
-                        sum
-                    });
+                    let placed = placed(rows, &own);
                     self.expand(inner, &placed, scale * reference.scale, depth + 1)?;
                 }
             }
@@ -491,12 +478,7 @@ impl Flat<'_> {
 impl Reference {
     /// Returns the sums of x and y: mirrored about the x axis first, then magnified and turned.
     fn rows(&self) -> [[f64; 2]; 2] {
-        // Sine and cosine of 90° in radians are not exactly 1 and 0.
-        let quarters = (self.degrees / 90.0).round();
-        let (mut sin, mut cos) = (self.degrees - 90.0 * quarters).to_radians().sin_cos();
-        for _ in 0..quarters.rem_euclid(4.0) as u32 {
-            (sin, cos) = (cos, -sin);
-        }
+        let (sin, cos) = sin_cos(self.degrees);
         let (sin, cos) = (sin * self.scale, cos * self.scale);
         let y = if self.is_mirrored { -1.0 } else { 1.0 };
         [[cos, -sin * y], [sin, cos * y]]

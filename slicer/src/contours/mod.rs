@@ -8,6 +8,7 @@ mod curves;
 mod dxf;
 mod error;
 mod gdsii;
+mod rows;
 mod svg;
 
 use std::collections::BTreeMap;
