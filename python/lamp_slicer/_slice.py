@@ -75,9 +75,9 @@ def slice(
 ) -> Layers:
     """Slices a part into layers. A pixel is white exactly if its center is inside the section.
 
-    `part` is the path of an STL, STEP, 3MF, OBJ, CLI, SVG, DXF or GDSII file, a list of paths that
-    share one coordinate system, `(vertices, faces)`, or an object that has both, such as a mesh of
-    trimesh. Coordinates of a mesh are in `units` and are rounded to 32 bits, as in an STL.
+    `part` is the path of an STL, STEP, 3MF, OBJ, CLI, SVG, DXF, GDSII or Gerber file, a list of
+    paths that share one coordinate system, `(vertices, faces)`, or an object that has both, such as
+    a mesh of trimesh. Coordinates of a mesh are in `units` and are rounded to 32 bits, as in an STL.
 
     The keywords are the options of `lamp slice`, which `lamp slice --help` describes:
 

@@ -1,7 +1,7 @@
 //! Decides what is inside a part, from the winding numbers of its bodies.
 //!
 //! A body holds a point where its surface winds around the point. The solids of an object unite,
-//! minus its negative volumes; objects and files unite. Files that cut are subtracted, or only
+//! minus its negative volumes and what later bodies erase; objects and files unite. Files that cut are subtracted, or only
 //! their inside is kept.
 
 use std::collections::{BTreeMap, HashMap};
@@ -42,6 +42,9 @@ pub(crate) enum BodyRole {
     Solid,
     /// It is cut out of the solids of its object, such as a negative volume of a 3MF project.
     Negative,
+    /// It is cut out of the solids of its object that come before it, such as clear polarity of a
+    /// Gerber file.
+    Eraser,
 }
 
 /// How a body counts.
@@ -59,7 +62,7 @@ pub(crate) struct BodyRule {
 impl BodyRule {
     /// Returns true if it only removes material.
     pub(crate) fn is_cutter(&self) -> bool {
-        self.role == BodyRole::Negative || self.join != Join::Unite
+        self.role != BodyRole::Solid || self.join != Join::Unite
     }
 }
 
@@ -187,15 +190,19 @@ impl FillRule {
             return holds.clone().next().is_some();
         }
         let rules = holds.map(|body| (body, &self.rules[body as usize]));
-        let is_cut = |of: &BodyRule| {
-            let mut others = rules.clone().map(|(_, rule)| rule);
-            others.any(|rule| {
-                let is_there = (rule.file, rule.object) == (of.file, of.object);
-                rule.role == BodyRole::Negative && is_there
+        let is_cut = |body: u32, of: &BodyRule| {
+            rules.clone().any(|(other, rule)| {
+                let cuts = match rule.role {
+                    BodyRole::Solid => false,
+                    BodyRole::Negative => true,
+                    BodyRole::Eraser => other > body,
+                };
+                cuts && (rule.file, rule.object) == (of.file, of.object)
             })
         };
-        let solids =
-            rules.clone().filter(|(_, rule)| rule.role == BodyRole::Solid && !is_cut(rule));
+        let solids = rules
+            .clone()
+            .filter(|&(body, rule)| rule.role == BodyRole::Solid && !is_cut(body, rule));
         let of = |join: Join| solids.clone().filter(move |(_, rule)| rule.join == join);
         if of(Join::Subtract).next().is_some() {
             return false;

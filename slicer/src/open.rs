@@ -88,8 +88,8 @@ impl Default for OpenOptions {
 }
 
 impl Part {
-    /// Opens an STL, STEP, 3MF or OBJ file, contours (CLI, SVG, DXF) or a layout (GDSII, SVG, DXF),
-    /// or one of these compressed with gzip. The content determines the format. A pipe is read to its end.
+    /// Opens an STL, STEP, 3MF or OBJ file, contours (CLI, SVG, DXF) or a layout (GDSII, Gerber,
+    /// SVG, DXF), or one of these compressed with gzip. The content determines the format. A pipe is read to its end.
     ///
     /// A binary STL must not change while the part is in use; [`check_unchanged`] checks this.
     ///
@@ -213,7 +213,11 @@ fn unpacked(
             Ok(of_facets(facets, notes))
         }
         Some(FileFormat::Part(
-            kind @ (PartFormat::Cli | PartFormat::Svg | PartFormat::Dxf | PartFormat::Gdsii),
+            kind @ (PartFormat::Cli
+            | PartFormat::Svg
+            | PartFormat::Dxf
+            | PartFormat::Gdsii
+            | PartFormat::Gerber),
         )) => match contours::read(file, kind, options.mask_thickness)? {
             Ok(Opened { pieces, layers_mm, notes }) => {
                 Ok(Contents { pieces, notes, layers_mm: Some(layers_mm) })

@@ -1,11 +1,12 @@
 //! Holds upright prisms: polygons between two heights, as contour files have them.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
 
 use robust::{Coord, orient2d};
 
+use crate::bodies::BodyRole;
 use crate::contours::ContourFault;
 use crate::decimal_mesh::offset_of;
 use crate::facet::Facet;
@@ -90,9 +91,20 @@ pub(crate) struct Drawing {
     corners: Vec<[f64; 2]>,
     polygons: Vec<Polygon>,
     slabs: Vec<[f64; 2]>,
-    /// The rule of each body. Bodies unite.
-    bodies: Vec<Fill>,
+    /// Bodies of a coat unite.
+    bodies: Vec<DrawnBody>,
+    /// The body of each coat.
+    coats: BTreeMap<u32, u32>,
+    /// The body that polygons are added to.
+    body: u32,
+    crossed: usize,
     steps_left: u64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct DrawnBody {
+    rule: Fill,
+    coat: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -105,8 +117,25 @@ struct Polygon {
 impl Drawing {
     /// Starts without polygons, with one body of this rule.
     pub(crate) fn new(rule: Fill) -> Self {
-        let (corners, polygons, slabs) = (Vec::new(), Vec::new(), Vec::new());
-        Self { corners, polygons, slabs, bodies: vec![rule], steps_left: MAX_STEPS }
+        Self {
+            corners: Vec::new(),
+            polygons: Vec::new(),
+            slabs: Vec::new(),
+            bodies: vec![DrawnBody { rule, coat: 0 }],
+            coats: BTreeMap::from([(0, 0)]),
+            body: 0,
+            crossed: 0,
+            steps_left: MAX_STEPS,
+        }
+    }
+
+    /// Adds the polygons that follow to a coat, in any order of coats. Odd ones are cut out of the
+    /// coats below them.
+    pub(crate) fn set_coat(&mut self, coat: u32) {
+        self.body = *self.coats.entry(coat).or_insert_with(|| {
+            self.bodies.push(DrawnBody { rule: self.bodies[0].rule, coat });
+            self.bodies.len() as u32 - 1
+        });
     }
 
     /// Adds a slab between two heights, or with heights that [`set_slabs`](Self::set_slabs) sets
@@ -126,14 +155,14 @@ impl Drawing {
         self.corners.len()
     }
 
-    /// Adds a polygon to the first body, as it runs: material is on its left. A polygon of fewer
+    /// Adds a polygon to the body of its coat, as it runs: material is on its left. A polygon of fewer
     /// than three corners has no area.
     pub(crate) fn add(
         &mut self,
         slab: u32,
         ring: impl IntoIterator<Item = [f64; 2]>,
     ) -> Result<(), ContourFault> {
-        self.add_to(0, slab, ring)
+        self.add_to(self.body, slab, ring)
     }
 
     fn add_to(
@@ -200,7 +229,8 @@ impl Drawing {
         Ok(())
     }
 
-    fn add_loop(
+    /// Adds a polygon that does not cross itself, turned as by [`add_turned`](Self::add_turned).
+    pub(crate) fn add_loop(
         &mut self,
         slab: u32,
         ring: &[[f64; 2]],
@@ -226,10 +256,11 @@ impl Drawing {
         let loops: Vec<Ring> = rings.iter().flat_map(|ring| loops(ring)).collect();
         let Some(around) = self.windings_around(&loops) else {
             // A body of its own, since its loops that turn right would cut others.
-            if self.bodies.len() > MAX_CROSSED {
+            if self.crossed == MAX_CROSSED {
                 return Err(ContourFault::Crossed(MAX_CROSSED));
             }
-            self.bodies.push(rule);
+            self.crossed += 1;
+            self.bodies.push(DrawnBody { rule, ..self.bodies[self.body as usize] });
             let body = self.bodies.len() as u32 - 1;
             return rings.iter().try_for_each(|ring| self.add_to(body, slab, ring.iter().copied()));
         };
@@ -299,7 +330,7 @@ impl Drawing {
         Some(around)
     }
 
-    /// Returns a piece for each body that has polygons, in the file's units.
+    /// Returns a piece for each body that has polygons, in the file's units, by coat.
     pub(crate) fn into_pieces(mut self) -> Vec<Piece> {
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
         let mut widen = |axis: usize, to: f64| {
@@ -319,7 +350,7 @@ impl Drawing {
         // By height, so that a slab of layers reads few blocks.
         let key = |&k: &u32| {
             let Polygon { slab, body, .. } = self.polygons[k as usize];
-            (body, slab, k)
+            ((self.bodies[body as usize].coat, body), slab, k)
         };
         order.sort_unstable_by_key(key);
         let of_bodies = order.chunk_by(|a, b| key(a).0 == key(b).0);
@@ -338,8 +369,15 @@ impl Drawing {
             }
             let facets = prisms.count();
             let facets_of = Facets::Prisms(Arc::new(prisms));
-            let fill = Some(self.bodies[body as usize]);
-            pieces.push(Piece { offset, first_facet, fill, ..Piece::new(facets_of) });
+            let DrawnBody { rule, coat } = self.bodies[body as usize];
+            let role = if coat % 2 == 1 { BodyRole::Eraser } else { BodyRole::Solid };
+            pieces.push(Piece {
+                offset,
+                first_facet,
+                fill: Some(rule),
+                role,
+                ..Piece::new(facets_of)
+            });
             first_facet += facets;
         }
         self.corners.clear();

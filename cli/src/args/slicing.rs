@@ -108,7 +108,7 @@ pub(crate) struct SlicingArgs {
 /// The part to slice, and the options of slicing.
 #[derive(Args, Clone)]
 pub(crate) struct SliceStageArgs {
-    /// The part: STL, STEP, 3MF, OBJ, CLI, SVG, DXF or GDSII files, or - for standard input
+    /// The part: STL, STEP, 3MF, OBJ, CLI, SVG, DXF, GDSII or Gerber files, or - for standard input
     ///
     /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns a file about z and then
     /// moves it. Overlapping files are united; --subtract and --intersect cut them

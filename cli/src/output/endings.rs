@@ -83,7 +83,8 @@ const MODELS: &[&str] = &[
     "stl", "step", "stp", "obj", "3mf", "ply", "off", "amf", "gltf", "glb", "wrl", "vrml", "x3d",
     "dae", "fbx", "3ds", "3dm", "blend", "usd", "usda", "usdz", "dxf", "dwg", "igs", "iges", "sat",
     "sab", "x_t", "x_b", "jt", "brep", "brp", "fcstd", "f3d", "sldprt", "sldasm", "ipt", "iam",
-    "catpart", "prt", "scad", "skp", "vtk", "msh",
+    "catpart", "prt", "scad", "skp", "vtk", "msh", "gds", "gbr", "ger", "gtl", "gbl", "gts", "gbs",
+    "gto", "gbo", "gtp", "gbp", "gko", "gm1",
 ];
 
 /// Endings that name a format, and what it is. All others say nothing.

@@ -141,12 +141,13 @@ fn contours(fault: &ContourFault) -> Option<String> {
         ContourFault::Open
         | ContourFault::OpenLines(_)
         | ContourFault::Twice(_)
+        | ContourFault::TooManyCoats(_)
         | ContourFault::Crossed(_) => return None,
         ContourFault::NoArea(_) => "check which layers and shapes were exported",
         ContourFault::TooManyCopies(_) | ContourFault::TooManyCorners(_) => {
             "export fewer shapes to a file"
         }
-        ContourFault::Unread(_) => "export plain closed polygons",
+        ContourFault::Unread(_) | ContourFault::Command(_) => "export plain closed polygons",
         _ => "export the file again",
     };
     Some(hint.to_owned())

@@ -36,6 +36,15 @@ pub enum ContourFault {
     /// A polygon comes before the first layer.
     #[error("has a polygon before the first layer")]
     NoLayer,
+    /// Contents come before a definition that they need.
+    #[error("is before {0}")]
+    Early(&'static str),
+    /// A command that would change the picture, and is not read.
+    #[error("has the command {0}, which is not read")]
+    Command(String),
+    /// Polarity changes too often.
+    #[error("has dark and clear areas on each other more than {0} times: export them merged")]
+    TooManyCoats(u32),
     /// Layers do not rise.
     #[error("has a layer that is not above the layer before it")]
     Falling,

@@ -1,4 +1,5 @@
-//! Reads contours and layouts: polygons at heights (CLI, SVG, DXF), and masks (GDSII, SVG, DXF).
+//! Reads contours and layouts: polygons at heights (CLI, SVG, DXF), and masks (GDSII, Gerber,
+//! SVG, DXF).
 //!
 //! Each polygon becomes a prism from the bottom to the top of its layer, whose facets cross planes
 //! and rows as all facets do.
@@ -8,6 +9,7 @@ mod curves;
 mod dxf;
 mod error;
 mod gdsii;
+mod gerber;
 mod rows;
 mod svg;
 
@@ -48,6 +50,7 @@ pub(crate) fn read(
         PartFormat::Cli => cli::read(text)?,
         PartFormat::Svg => svg::read(text, mask.mm())?,
         PartFormat::Dxf => dxf::read(text, mask.mm())?,
+        PartFormat::Gerber => gerber::read(text, mask.mm())?,
         _ => gdsii::read(text, mask.mm())?,
     };
     Ok(opened.and_then(|opened| {

@@ -10,6 +10,7 @@ mod even_rows;
 mod fill;
 mod flat_faces;
 mod formats;
+mod gerber;
 mod gray;
 mod layers;
 mod pitch;

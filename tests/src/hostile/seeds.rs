@@ -271,7 +271,17 @@ fn contours() -> Named {
         record(0x04, 0, &[]),
     ]
     .concat();
+    let gerber = "G04 A board*\n%FSLAX24Y24*%\n%MOIN*%\n%TF.Part,Single*%\n\
+                  %AMM*0 a ring*$2=$1x.5-(.1/2)*1,1,$1,0,0*1,0,$2,0,0*20,1,.1,-1,0,1,0,30*\n\
+                  4,1,3,0,0,1,0,0,1,0,0,0*5,1,6,0,0,1,0*7,0,0,1,.5,.1,45*6,0,0,2,.1,.1,3,.1,2,0*%\n\
+                  %ADD10C,.2X.1*%\n%ADD11R,.3X.1*%\n%ADD12O,.1X.4X.05X.05*%\n%ADD13P,1X5X9*%\n\
+                  %ADD14M,1.5*%\n%ADD15C,.05*%\n%ABD20*%D14*X0Y0D03*%LPC*%D10*X5000D03*%AB*%\n\
+                  D15*G75*X0Y0D02*G01X9000D01*G03Y9000I0J4500D01*G74*G02X5000Y5000I4000J0D01*\n\
+                  D11*G01X0Y0D01*%LMX*%%LR30*%%LS.5*%%SRX2Y3I2J2.5*%D12*X100Y100D03*D13*D03*%SR*%\n\
+                  %LPC*%D20*X7000Y7000D03*%LPD*%G36*X0Y0D02*X5000D01*Y5000D01*X0Y0D01*\n\
+                  X100Y100D02*X200D01*Y200D01*X100Y100D01*G37*M02*\n";
     vec![
+        ("board.gbr", gerber.into()),
         ("layers.cli", cli.into()),
         ("binary.cli", binary),
         ("layers.svg", svg.into()),
