@@ -61,7 +61,7 @@ pub(super) fn run(args: &LampArgs, common: &Common) -> Result<(), Exit> {
         }
     };
     let title = format!("Cure depth by lamp: {}", files.source_name());
-    files.finish(base, add, &plot(title, &fit, points), &fitted)
+    files.finish(base, add, &plot(title, &fit, points), &fitted, common)
 }
 
 fn plot(title: String, fit: &LampFit, points: &[LampPoint]) -> Plot {

@@ -24,6 +24,7 @@ use crate::exit::Exit;
 use crate::output::endings::parse_toml;
 use crate::output::json_report::ReportTo;
 use crate::streams::{check_beside, input_name, is_stream, write_file};
+use crate::terminal::progress::Progress;
 use estimate_table::EstimateTable;
 use lamp_plots::{self as plots, Plot, drawn};
 
@@ -171,7 +172,9 @@ impl CalibrationFiles {
         add: impl FnOnce(&mut Material),
         plot: &Plot,
         fitted: &EstimateTable,
+        common: &Common,
     ) -> Result<(), Exit> {
+        let progress = Progress::new("calibrate", common, true);
         let draw = |path| drawn(slice::from_ref(plot), path).map(|bytes| (path, bytes));
         let plot = self.plot.as_deref().map(draw).transpose()?;
         let material = self.output.as_deref().map(|output| -> Result<_, Exit> {
@@ -194,6 +197,7 @@ impl CalibrationFiles {
         // The plot first: where it cannot be written, no material is left.
         for (path, bytes) in plot.into_iter().chain(material.transpose()?) {
             write_file(path, |out| out.write_all(&bytes))?;
+            progress.wrote(path, &[]);
         }
         fitted.write(&self.report)
     }

@@ -34,7 +34,7 @@ pub(super) struct ScanArgs {
     dpi: Dpi,
 }
 
-pub(super) fn run(args: &ScanArgs, _: &Common) -> Result<(), Exit> {
+pub(super) fn run(args: &ScanArgs, common: &Common) -> Result<(), Exit> {
     let files = &args.files;
     files.check()?;
     let base = files.base()?;
@@ -62,7 +62,7 @@ pub(super) fn run(args: &ScanArgs, _: &Common) -> Result<(), Exit> {
         }
         material.spread = Some(fit.numbers(&files.source(fit.points)));
     };
-    files.finish(base, add, &plot, &fitted)
+    files.finish(base, add, &plot, &fitted, common)
 }
 
 /// Growth of lines and gaps over their width.
