@@ -238,7 +238,7 @@ impl StageChain {
         }
         // After the work: stages add remarks while layers pass.
         findings.of_part = remarks.take();
-        Ok(findings.of(&range))
+        Ok(findings.of(&(range.start..range.end.min(slicing.part_layers()))))
     }
 }
 
