@@ -52,10 +52,19 @@ impl Viewing {
     #[track_caller]
     pub fn start(scratch: &Scratch, words: &str) -> Self {
         let mut viewing = Self::unopened(scratch, words, &[]);
-        let welcome = viewing.ask(&viewing.request(&format!("/?token={}", viewing.token()), ""));
-        let cookie = welcome.header("set-cookie").expect("the token becomes a cookie");
-        viewing.cookie = cookie.split(';').next().expect("there is a first part").to_owned();
+        viewing.open();
         viewing
+    }
+
+    /// Opens its address for the cookie.
+    ///
+    /// # Panics
+    /// Panics if there is none.
+    #[track_caller]
+    pub fn open(&mut self) {
+        let welcome = self.ask(&self.request(&format!("/?token={}", self.token()), ""));
+        let cookie = welcome.header("set-cookie").expect("the token becomes a cookie");
+        self.cookie = cookie.split(';').next().expect("there is a first part").to_owned();
     }
 
     /// Starts `lamp view` with some environment variables, and leaves its address, which works

@@ -42,7 +42,7 @@ fn ended(viewing: &Viewing) -> Value {
 
 fn order(file: &str, machine: &str, more: &Value) -> Value {
     let mut order = json!({"file": file, "machine": machine, "dpi": null, "thickness": null,
-        "rotate": null, "build": null});
+        "rotate": null, "build": null, "replace": false});
     order.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
     order
 }
@@ -108,10 +108,66 @@ fn a_part_is_sliced_again_once_it_changes() {
     assert_eq!([upload(""), upload("?replace=true"), upload("")], [409, 200, 200]);
     assert!(scratch.bytes("work/torus.stl") == other);
     assert_ne!(make(&coarse), back);
-    // Nor is a stack taken for its own that another program wrote.
-    scratch.write("work/torus-layers.tif", b"another program's");
-    make(&coarse);
-    assert!(!scratch.layers("work/torus-layers.tif").is_empty());
+}
+
+/// Only files that orders of the same part wrote are replaced unasked, and nothing is written through
+/// a link.
+#[test]
+fn an_order_replaces_only_its_own_files() {
+    let (scratch, viewing) = viewing();
+    let body = |replace: bool| {
+        let more = json!({"thickness": "200um", "replace": replace});
+        serde_json::to_vec(&order("torus.stl", "mars3", &more)).unwrap()
+    };
+    let make =
+        |replace| viewing.put("POST", "/api/work/make", "application/json", &body(replace)).status;
+    scratch.write("work/torus-layers.tif", b"of a person");
+    assert_eq!(make(false), 409);
+    assert_eq!(scratch.bytes("work/torus-layers.tif"), b"of a person");
+    assert_eq!(make(true), 200);
+    assert_eq!(ended(&viewing)["status"], "ready");
+    assert_eq!(make(false), 200);
+    assert_eq!(ended(&viewing)["status"], "ready");
+    // A part of the same stem has the same product.
+    std::fs::copy(scratch.path("work/torus.stl"), scratch.path("work/torus.obj")).unwrap();
+    let of_other = serde_json::to_vec(&order("torus.obj", "mars3", &json!({}))).unwrap();
+    let other = viewing.put("POST", "/api/work/make", "application/json", &of_other);
+    assert_eq!(other.status, 409, "{}", other.text());
+    #[cfg(unix)]
+    {
+        scratch.write("outside.tif", b"outside");
+        std::fs::remove_file(scratch.path("work/torus-layers.tif")).unwrap();
+        let link = scratch.path("work/torus-layers.tif");
+        std::os::unix::fs::symlink(scratch.path("outside.tif"), link).unwrap();
+        assert_eq!([make(false), make(true)], [403; 2]);
+        assert_eq!(scratch.bytes("outside.tif"), b"outside");
+    }
+}
+
+/// A machine of one's own whose file changes makes other layers.
+#[cfg(unix)]
+#[test]
+fn a_machine_that_changes_makes_other_layers() {
+    let scratch = Scratch::new();
+    std::fs::create_dir_all(scratch.path("work")).unwrap();
+    std::fs::create_dir_all(scratch.path("config/lamp/machines")).unwrap();
+    scratch.part("work/torus.stl", Sample::Torus, 2_000);
+    let mars = String::from_utf8(scratch.run("lamp machine show mars3").stdout).unwrap();
+    let write = |text: &str| scratch.write("config/lamp/machines/mine.toml", text.as_bytes());
+    let mine = mars.replace("name = \"mars3\"", "name = \"mine\"");
+    write(&mine);
+    let config = scratch.path("config");
+    let mut viewing =
+        Viewing::unopened(&scratch, "--work work --threads 2", &[("XDG_CONFIG_HOME", &*config)]);
+    viewing.open();
+    let width = || {
+        let job = ordered(&viewing, &order("torus.stl", "mine", &json!({"thickness": "200um"})));
+        assert_eq!(job["status"], "ready", "{job}");
+        scratch.layers("work/torus-layers.tif")[0].image.width()
+    };
+    let first = width();
+    write(&mine.replace("[4098, 2560]", "[4000, 2560]"));
+    assert_eq!([first, width()], [4098, 4000]);
 }
 
 #[test]
@@ -184,7 +240,7 @@ fn work_that_is_stopped_leaves_nothing() {
     assert_eq!(make().status, 403, "one order at a time");
     assert_eq!(viewing.put("POST", "/api/work/stop", "text/plain", b"").status, 200);
     let job = ended(&viewing);
-    assert_eq!((&job["status"], &job["message"]), (&json!("failed"), &json!("it was stopped")));
+    assert_eq!((&job["status"], &job["message"]), (&json!("stopped"), &Value::Null));
     assert_eq!(scratch.names_in("work"), ["torus.stl"]);
 }
 

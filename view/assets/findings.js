@@ -85,6 +85,8 @@ export class Findings extends EventTarget {
       ready: "Nothing was found.",
     };
     byId("findings-state").textContent = words[state.status] ?? "";
+    byId("work-found").hidden = state.status !== "ready";
+    byId("work-found").textContent = `Findings: ${state.list?.length || "none"}`;
     if (state.status !== "ready" || !state.list.length) return;
     const pitch = pitchOf(this.#app.session.stacks[0].dpi);
     this.#all = state.list.map((finding) => ({ ...finding, size: sizeOf(finding.box, pitch) }));

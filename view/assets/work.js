@@ -8,10 +8,9 @@ export class Work {
   #fail;
   /** @type {any} what the server answered last */
   #state = null;
-  /** Whether a result that comes is new to this page. */
-  #waits = false;
-  /** @type {File | null} a file that waits for the word to replace another */
-  #file = null;
+  #isStopping = false;
+  /** @type {(() => void) | null} does what was refused, and replaces the file that is in its way */
+  #replace = null;
 
   /** @param {(error: Error) => void} fail */
   constructor(fail) {
@@ -27,8 +26,13 @@ export class Work {
       byId("work-rotate").value = target.value;
     });
     byId("work-rotate").addEventListener("input", () => (byId("work-turn").value = ""));
-    byId("work-stop").addEventListener("click", () => this.#do(() => this.#send("POST", "/api/work/stop")));
-    byId("work-replace").addEventListener("click", () => this.#take(this.#file, true));
+    byId("work-stop").addEventListener("click", () => {
+      this.#isStopping = true;
+      this.#say("Stopping …");
+      this.#do(() => this.#send("POST", "/api/work/stop"));
+    });
+    byId("work-replace").addEventListener("click", () => this.#replace());
+    byId("work-found").addEventListener("click", () => byId("findings").scrollIntoView());
     byId("work-pick").addEventListener("change", ({ target }) => {
       const [file] = target.files;
       target.value = "";
@@ -65,26 +69,20 @@ export class Work {
   /** Brings a file to the folder, and chooses it. */
   #take(file, replace) {
     return this.#do(async () => {
-      this.#file = null;
       this.#say(`Copying ${file.name} …`);
       const path = `/api/work/files/${encodeURIComponent(file.name)}?replace=${replace}`;
       try {
         this.#show(await this.#send("PUT", path, file));
-      } catch (error) {
-        // The answer to a file of the same name with other bytes.
-        if (error.status === 409) this.#file = file;
-        throw error;
       } finally {
         this.#say("");
-        byId("work-replace").hidden = !this.#file;
       }
       byId("work-file").value = file.name;
       this.#offer();
-    });
+    }, () => this.#take(file, true));
   }
 
   /** Orders the layers of the chosen file, or its build. */
-  #order(isBuild) {
+  #order(isBuild, replace = false) {
     const text = (id) => byId(id).value.trim() || null;
     const copies = text("work-copies");
     const build = { copies: copies && Number(copies), mesh: byId("work-mesh").checked, ending: byId("work-format").value };
@@ -96,12 +94,14 @@ export class Work {
       thickness: isPart ? text("work-thickness") : null,
       rotate: isPart ? text("work-rotate") : null,
       build: isBuild ? build : null,
+      replace,
     };
     this.#do(async () => {
+      this.#isStopping = false;
       const headers = { "content-type": "application/json" };
       this.#show(await this.#send("POST", "/api/work/make", JSON.stringify(order), headers));
       await this.#wait();
-    });
+    }, () => this.#order(isBuild, true));
   }
 
   /** Waits for the work, and loads the page again for the stack that came of it. */
@@ -117,13 +117,16 @@ export class Work {
     return (await ask(path, undefined, { method, body, headers })).json();
   }
 
-  /** Does something that may fail. */
-  async #do(work) {
+  /** Does something that may fail. Where another file is in the way, `replace` is offered. */
+  async #do(work, replace = null) {
     byId("message").hidden = true;
+    byId("work-replace").hidden = true;
     try {
       await work();
     } catch (error) {
       this.#fail(error);
+      this.#replace = replace;
+      byId("work-replace").hidden = error.status !== 409;
     }
   }
 
@@ -138,7 +141,7 @@ export class Work {
     const files = state.files.map(({ name, bytes }) => option(name, `${name} (${size(bytes)})`));
     fill("work-file", files.length ? files : [option("", "no part yet")]);
     if (isFirst) {
-      fill("work-machine", [option("", "none"), ...state.machines.map(({ name, description }) => option(name, `${name}: ${description}`))]);
+      fill("work-machine", [option("", "none: the build area of alpha"), ...state.machines.map(({ name, description }) => option(name, `${name}: ${description}`))]);
     }
     const { job } = state;
     const isRunning = job?.status === "running";
@@ -149,16 +152,15 @@ export class Work {
     const words = {
       running: `${job.order.file}: ${job.step || "reading the part"}${share}`,
       failed: `${job.order.file}: ${job.message}`,
+      stopped: `${job.order.file}: stopped. The folder is as it was.`,
       ready: job.made && `${job.made.file} is in the folder.`,
     };
-    this.#say(words[job.status] ?? "");
+    this.#say(isRunning && this.#isStopping ? "Stopping …" : (words[job.status] ?? ""));
     byId("work-state").classList.toggle("wrong", job.status === "failed");
     const { made } = job;
     byId("work-made").hidden = !made;
     if (!made) return;
-    byId("work-get").href = `/api/work/files/${encodeURIComponent(made.file)}`;
-    byId("work-get").download = made.file;
-    byId("work-get").textContent = `Download ${made.file}`;
+    link("work-get", made.file);
     byId("work-notes").replaceChildren(...made.notes.map((note) => element("li", note)));
     byId("work-commands").hidden = !made.commands.length;
     byId("work-commands").lastElementChild.textContent = made.commands.join("\n");
@@ -185,7 +187,7 @@ export class Work {
   }
 
   #isStack() {
-    return this.#state.formats.some(({ ending }) => byId("work-file").value.toLowerCase().endsWith(`.${ending}`));
+    return this.#state.files.some(({ name, kind }) => name === byId("work-file").value && kind === "stack");
   }
 
   /** Offers what can be done with the chosen file. */
@@ -194,6 +196,8 @@ export class Work {
     const isRunning = this.#state?.job?.status === "running";
     byId("work-slice").disabled = byId("work-build").disabled = isNone || isRunning;
     const isStack = !isNone && this.#isStack();
+    byId("work-chosen").hidden = isNone;
+    link("work-chosen", byId("work-file").value);
     byId("work-slice").textContent = isStack ? "Check" : "Slice and check";
     for (const field of byId("work-slicing").querySelectorAll("input, select")) field.disabled = isStack;
   }
@@ -216,6 +220,13 @@ function fill(id, options) {
   const chosen = list.value;
   list.replaceChildren(...options);
   if (options.some(({ value }) => value === chosen)) list.value = chosen;
+}
+
+/** Lets a link download a file of the folder. */
+function link(id, name) {
+  byId(id).href = `/api/work/files/${encodeURIComponent(name)}`;
+  byId(id).download = name;
+  byId(id).textContent = `Download ${name}`;
 }
 
 /** The size of a file. */

@@ -113,6 +113,7 @@ impl<T> Background<T> {
             WorkState::NotWanted => ("none", None),
             WorkState::Running => ("running", None),
             WorkState::Ready(_) => ("ready", None),
+            WorkState::Failed(_) if self.progress.is_stopped() => ("stopped", None),
             WorkState::Failed(message) => ("failed", Some(message.clone())),
         };
         let number = |number: &AtomicU64| number.load(Ordering::Relaxed);

@@ -33,4 +33,6 @@ pub use server::{Address, Ticket, Token, serve};
 pub use stack::ViewedStack;
 pub use surface::{CellGrid, MAX_CELLS, StackSurface, SurfaceError, SurfaceOptions, SurfaceUnit};
 pub use viewer::Viewer;
-pub use work_folder::{BuildOrder, FormatChoice, MachineChoice, Made, Order, WorkFolder, Workshop};
+pub use work_folder::{
+    BuildOrder, FormatChoice, InputKind, MachineChoice, Made, Order, WorkFolder, Workshop,
+};

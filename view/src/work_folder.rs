@@ -1,10 +1,12 @@
 //! A folder whose parts become stacks and builds, as the page asks.
 
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::num::NonZeroU32;
-use std::path::{Path, PathBuf};
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
 
 use lamp_stack::{FileBeside, IndexedStack, digest_of};
 use serde::{Deserialize, Serialize};
@@ -33,6 +35,8 @@ pub struct Order {
     pub rotate: Option<String>,
     /// The build that is wanted; `None` if the layers are enough.
     pub build: Option<BuildOrder>,
+    /// Whether files of the folder that came from elsewhere may be replaced.
+    pub replace: bool,
 }
 
 /// The wish for a build.
@@ -69,6 +73,16 @@ pub struct FormatChoice {
     pub needs_panel: bool,
 }
 
+/// The kind of a file by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InputKind {
+    /// A part, which is sliced.
+    Part,
+    /// A stack, which is used as it is.
+    Stack,
+}
+
 /// The file that came of an order.
 #[derive(Clone, Debug, Serialize)]
 pub struct Made {
@@ -88,8 +102,11 @@ pub trait Workshop: Send + Sync {
     /// Returns the formats of builds that may be chosen.
     fn formats(&self) -> Vec<FormatChoice>;
 
-    /// Returns whether a file of this name may be a part or a stack.
-    fn is_input(&self, name: &Path) -> bool;
+    /// Returns the kind of files with this name; `None` if they are neither parts nor stacks.
+    fn kind_of(&self, name: &Path) -> Option<InputKind>;
+
+    /// Returns the names of the files that an order may write.
+    fn products(&self, order: &Order) -> Vec<String>;
 
     /// Makes the stack or the build of an order, whose file is in the folder.
     ///
@@ -114,6 +131,10 @@ pub struct WorkFolder {
     folder: PathBuf,
     workshop: Box<dyn Workshop>,
     job: Mutex<Option<Job>>,
+    /// The files that orders wrote, each with the file that it was made of.
+    products: Mutex<HashMap<String, (String, FileState)>>,
+    /// Held while a file gets its name, so that none is replaced unseen.
+    naming: Mutex<()>,
 }
 
 /// The last order, and its result.
@@ -123,10 +144,15 @@ struct Job {
     result: Arc<Background<Made>>,
 }
 
+/// The size and time of a file, which change when the file does.
+type FileState = (u64, Option<SystemTime>);
+
 /// The most files that the page lists.
-const MOST_FILES: usize = 1000;
-/// The longest name of a file, in bytes: systems take 255, and products get longer names.
-const LONGEST_NAME: usize = 200;
+const MOST_FILES: usize = 10_000;
+/// The longest name of a file, in bytes: systems take 255.
+const LONGEST_NAME: usize = 255;
+/// The longest name of a file that is sent: products get longer names.
+const LONGEST_SENT: usize = 200;
 
 impl WorkFolder {
     /// Takes a folder, and the workshop that works on its files.
@@ -137,7 +163,8 @@ impl WorkFolder {
         let folder = fs::canonicalize(folder)?;
         // A file, which has a canonical path, too, is no place for files.
         fs::read_dir(&folder)?;
-        Ok(Self { folder, workshop, job: Mutex::default() })
+        let (job, products, naming) = Default::default();
+        Ok(Self { folder, workshop, job, products, naming })
     }
 
     /// Returns what the page may choose from, and how the last order fares.
@@ -166,13 +193,29 @@ impl WorkFolder {
             };
             let Some(name) = name.to_str().filter(|name| is_name(name)) else { continue };
             // Links are followed by no one here: they may lead out of the folder.
-            if facts.is_file() && self.workshop.is_input(Path::new(name)) {
-                files.push((name.to_owned(), facts.len()));
+            if let Some(kind) = self.workshop.kind_of(Path::new(name)).filter(|_| facts.is_file()) {
+                files.push((name.to_owned(), facts.len(), kind));
             }
         }
-        files.sort();
+        files.sort_by(|(a, ..), (b, ..)| a.cmp(b));
         files.truncate(MOST_FILES);
-        Ok(files.into_iter().map(|(name, bytes)| json!({"name": name, "bytes": bytes})).collect())
+        let file = |(name, bytes, kind): (String, u64, InputKind)| json!({"name": name, "bytes": bytes, "kind": kind});
+        Ok(files.into_iter().map(file).collect())
+    }
+
+    /// Returns the state of a file of the folder; `None` if it is not there.
+    ///
+    /// # Errors
+    /// Returns an error if something else has the name: it would be written through.
+    fn state_of(&self, name: &str) -> Result<Option<FileState>, ViewError> {
+        match fs::symlink_metadata(self.folder.join(name)) {
+            Ok(facts) if facts.is_file() => Ok(Some((facts.len(), facts.modified().ok()))),
+            Ok(_) => {
+                let text = format!("{name} in the folder is no file: rename it, or remove it");
+                Err(ViewError::Refused(text))
+            }
+            Err(_) => Ok(None),
+        }
     }
 
     /// Returns the path of a file in the folder.
@@ -195,26 +238,21 @@ impl WorkFolder {
         bytes: impl Read,
         replace: bool,
     ) -> Result<(), ViewError> {
-        if !is_name(name) {
+        if !is_name(name) || name.len() > LONGEST_SENT {
             return Err(ViewError::Malformed("this is no name of a file on all systems"));
         }
-        if !self.workshop.is_input(Path::new(name)) {
+        if self.workshop.kind_of(Path::new(name)).is_none() {
             return Err(ViewError::Refused(format!(
                 "{name} is no part and no stack by its ending"
             )));
         }
         let path = self.folder.join(name);
         let failed = |error| self.failed(name, &error);
-        // Also a link, which would be written through.
-        let is_taken = match fs::symlink_metadata(&path) {
-            Ok(facts) if !facts.is_file() => {
-                return Err(ViewError::Refused(format!("{name} is no file in the folder")));
-            }
-            facts => facts.is_ok(),
-        };
+        self.state_of(name)?;
         let beside = FileBeside::new(&path).map_err(failed)?;
         copy(bytes, &beside.file()).map_err(failed)?;
-        if is_taken && !replace {
+        let _naming = self.naming.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.state_of(name)?.is_some() && !replace {
             let digest = |mut file: &File| {
                 io::Seek::rewind(&mut file)?;
                 digest_of(file)
@@ -253,7 +291,9 @@ impl WorkFolder {
             let Job { order, result } = job;
             result.run(|progress| {
                 let clean = |text: String| folder.without_paths(&text);
-                let made = folder.workshop.make(&order, progress).map_err(clean)?;
+                let made = folder.workshop.make(&order, progress);
+                folder.note_products(&order);
+                let made = made.map_err(clean)?;
                 let path = folder.folder.join(&made.file);
                 let pages = IndexedStack::open(&path)
                     .map_err(|error| clean(format!("{}: {}", made.file, ViewError::from(error))))?;
@@ -285,7 +325,28 @@ impl WorkFolder {
         let no_format = order.build.as_ref().is_some_and(|build| {
             self.workshop.formats().iter().all(|format| format.ending != build.ending)
         });
-        if no_format { Err(ViewError::NoSuch("format")) } else { Ok(()) }
+        if no_format {
+            return Err(ViewError::NoSuch("format"));
+        }
+        let products = self.products.lock().unwrap_or_else(PoisonError::into_inner);
+        for name in self.workshop.products(order) {
+            let state = self.state_of(&name)?;
+            let known = products.get(&name).filter(|(of, _)| *of == order.file);
+            if state.is_some() && state != known.map(|(_, state)| *state) && !order.replace {
+                return Err(ViewError::Taken(name));
+            }
+        }
+        Ok(())
+    }
+
+    /// Records what an order has written, which the next order of the same file may replace.
+    fn note_products(&self, order: &Order) {
+        let mut products = self.products.lock().unwrap_or_else(PoisonError::into_inner);
+        for name in self.workshop.products(order) {
+            if let Ok(Some(state)) = self.state_of(&name) {
+                products.insert(name, (order.file.clone(), state));
+            }
+        }
     }
 
     /// Stops the order that is in work.
@@ -297,7 +358,8 @@ impl WorkFolder {
 
     /// Names files without the folder: answers hold no paths.
     fn without_paths(&self, text: &str) -> String {
-        text.replace(&format!("{}{}", self.folder.display(), std::path::MAIN_SEPARATOR), "")
+        let folder = self.folder.display().to_string();
+        text.replace(&format!("{folder}{MAIN_SEPARATOR}"), "").replace(&folder, "the folder")
     }
 
     fn failed(&self, name: &str, error: &io::Error) -> ViewError {
@@ -313,9 +375,17 @@ impl WorkFolder {
 
 /// Returns whether a text is the name of a file, on all systems, and not a hidden one.
 fn is_name(name: &str) -> bool {
-    let is_plain = |c: char| !c.is_control() && !r#"/\:*?"<>|"#.contains(c);
+    // Marks of direction would show another name than the file has.
+    let is_mark = |c| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let is_plain = |c: char| !c.is_control() && !is_mark(c) && !r#"/\:*?"<>|"#.contains(c);
+    // Devices of Windows, with any ending.
+    let stem = name.split('.').next().unwrap_or_default().to_ascii_lowercase();
+    let is_port = |port| stem.strip_prefix(port).is_some_and(|number| number.len() == 1);
+    let is_device =
+        matches!(&*stem, "con" | "prn" | "aux" | "nul") || is_port("com") || is_port("lpt");
     (1..=LONGEST_NAME).contains(&name.len())
         && name.chars().all(is_plain)
+        && !is_device
         && !name.starts_with(['.', '-', ' '])
         && !name.ends_with(['.', ' '])
 }
@@ -341,8 +411,12 @@ mod tests {
             Vec::new()
         }
 
-        fn is_input(&self, name: &Path) -> bool {
-            name.extension().is_some_and(|ending| ending == "stl")
+        fn kind_of(&self, name: &Path) -> Option<InputKind> {
+            name.extension().is_some_and(|ending| ending == "stl").then_some(InputKind::Part)
+        }
+
+        fn products(&self, order: &Order) -> Vec<String> {
+            vec![format!("{}.tif", order.file)]
         }
 
         fn make(&self, _: &Order, _: &WorkProgress) -> Result<Made, String> {
@@ -396,7 +470,10 @@ mod tests {
         assert_eq!(fs::read(root.path().join("out.stl")).unwrap(), b"outside");
         assert_eq!(fs::read_dir(root.path().join("work")).unwrap().count(), 0);
         folder.keep("ä b.stl", &b"new"[..], false).unwrap();
-        assert_eq!(folder.files().unwrap(), [json!({"name": "ä b.stl", "bytes": 3})]);
+        let file = json!({"name": "ä b.stl", "bytes": 3, "kind": "part"});
+        assert_eq!(folder.files().unwrap(), [file]);
+        let long = format!("{}.stl", "a".repeat(197));
+        assert!(folder.keep(&long, &b"new"[..], false).is_err());
     }
 
     #[cfg(unix)]
@@ -421,6 +498,38 @@ mod tests {
         folder.keep("a.stl", &b"other"[..], true).unwrap();
         assert_eq!(now(), b"other");
         assert_eq!(fs::read_dir(root.path().join("work")).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn products_replace_nothing_unasked() {
+        let (root, folder) = folder();
+        let folder = Arc::new(folder);
+        let order = |replace| Order {
+            file: "a.stl".to_owned(),
+            machine: None,
+            dpi: None,
+            thickness: None,
+            rotate: None,
+            build: None,
+            replace,
+        };
+        let work = root.path().join("work");
+        fs::write(work.join("a.stl"), "part").unwrap();
+        folder.check(&order(false)).unwrap();
+        fs::write(work.join("a.stl.tif"), "made").unwrap();
+        let taken = Err(ViewError::Taken("a.stl.tif".into()));
+        assert_eq!(
+            (folder.check(&order(false)), folder.check(&order(true))),
+            (taken.clone(), Ok(()))
+        );
+        folder.note_products(&order(false));
+        folder.check(&order(false)).unwrap();
+        fs::write(work.join("a.stl.tif"), "of a person").unwrap();
+        assert_eq!(folder.check(&order(false)), taken);
+        // Not even on request.
+        fs::remove_file(work.join("a.stl.tif")).unwrap();
+        fs::create_dir(work.join("a.stl.tif")).unwrap();
+        assert!(folder.check(&order(true)).is_err());
     }
 
     #[test]

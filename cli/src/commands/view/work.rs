@@ -1,5 +1,6 @@
 //! The chain in the browser: parts of a folder become stacks and builds by the stages of a night.
 
+use std::collections::HashMap;
 use std::fs;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -8,12 +9,12 @@ use std::time::SystemTime;
 
 use anyhow::{Context, anyhow};
 use lamp_machine::Machine;
-use lamp_pipeline::documents::{document, own_names};
+use lamp_pipeline::documents::{document, document_and_word, own_names};
 use lamp_pipeline::watcher::KeptRemarks;
-use lamp_stack::{Catalogued, Layer, Pages, STACK_ENDINGS, StackError, StackFormat, quoted};
+use lamp_stack::{Catalogued, Layer, Pages, StackError, StackFormat, quoted};
 use lamp_view::{
-    BuildOrder, Finding, FormatChoice, MachineChoice, Made, Order, ViewedStack, WorkFolder,
-    WorkProgress, Workshop,
+    BuildOrder, Finding, FormatChoice, InputKind, MachineChoice, Made, Order, ViewedStack,
+    WorkFolder, WorkProgress, Workshop,
 };
 
 use super::find;
@@ -22,7 +23,7 @@ use crate::exit::Exit;
 use crate::output::endings::is_model_name;
 use crate::stages::calls::Tiling;
 use crate::stages::parse::{parse, parse_check};
-use crate::streams::write_layers;
+use crate::streams::{extension, write_layers};
 use crate::terminal::progress::Progress;
 
 /// Takes a folder for the page's work, made if it is not there.
@@ -40,16 +41,19 @@ pub(super) fn folder(path: &Path) -> Result<WorkFolder, Exit> {
 /// `slice | fix`, then `tile`, in a folder.
 struct Chain {
     root: PathBuf,
-    /// The stack that was sliced last: a build of the same part needs no second one.
-    sliced: Mutex<Option<Sliced>>,
+    /// The stacks that were sliced, by their names: a build of the same part needs no second one.
+    sliced: Mutex<HashMap<String, Sliced>>,
 }
 
 /// A stack, what it was made of, and how.
 #[derive(Clone, PartialEq)]
 struct Sliced {
     words: Vec<String>,
+    /// The machine's name with the digest of its text.
+    machine: Option<String>,
     part: FileState,
     stack: FileState,
+    notes: Vec<String>,
 }
 
 /// The size and time of a file, which change when the file does.
@@ -82,9 +86,24 @@ impl Workshop for Chain {
         StackFormat::all().filter(read).filter_map(choice).collect()
     }
 
-    fn is_input(&self, name: &Path) -> bool {
-        let ending = name.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        is_model_name(name) || STACK_ENDINGS.contains(&&*ending)
+    fn kind_of(&self, name: &Path) -> Option<InputKind> {
+        let ending = extension(name);
+        match StackFormat::of_name(name) {
+            // Contours are drawings of layers as output, and parts as input.
+            Some(StackFormat::Contours(_)) => Some(InputKind::Part),
+            Some(_) => Some(InputKind::Stack),
+            None if ending == "png" => Some(InputKind::Stack),
+            None if is_model_name(name) || ending == "gz" => Some(InputKind::Part),
+            None => None,
+        }
+    }
+
+    fn products(&self, order: &Order) -> Vec<String> {
+        let name = stem(&order.file);
+        let is_part = self.kind_of(order.file.as_ref()) != Some(InputKind::Stack);
+        let layers = is_part.then(|| format!("{name}-layers.tif"));
+        let build = order.build.as_ref().map(|build| format!("{name}-build.{}", build.ending));
+        layers.into_iter().chain(build).collect()
     }
 
     fn make(&self, order: &Order, progress: &WorkProgress) -> Result<Made, String> {
@@ -124,7 +143,8 @@ impl Chain {
     /// Returns the stack of an order's file: the file itself, or what its part is sliced into.
     fn stack(&self, order: &Order, progress: &WorkProgress) -> Result<Made, Exit> {
         let (name, part) = (order.file.clone(), self.root.join(&order.file));
-        if !matches!(Pages::open(&part), Err(StackError::NotTiff { .. })) {
+        let is_stack = !matches!(Pages::open(&part), Err(StackError::NotTiff { .. }));
+        if is_stack && self.kind_of(name.as_ref()) != Some(InputKind::Part) {
             let mut given = ["dpi", "thickness", "rotate"].into_iter().zip(slice_values(order));
             if let Some((option, _)) = given.find(|(_, value)| value.is_some()) {
                 return Err(Exit::usage(format!(
@@ -143,12 +163,16 @@ impl Chain {
             let facts = fs::metadata(path).and_then(|facts| Ok((facts.len(), facts.modified()?)));
             Ok(facts.with_context(|| path.display().to_string())?)
         };
-        let part_state = state(&part)?;
-        let of_stack = |stack| Sliced { words: words.clone(), part: part_state, stack };
+        let word = |name: &String| document_and_word::<Machine>(name.as_ref()).map(|it| it.1);
+        let machine = order.machine.as_ref().map(word).transpose()?;
+        let (part_state, stack) = (state(&part)?, self.root.join(&output));
         let mut sliced = self.sliced.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = state(&self.root.join(&output)).ok().map(of_stack);
-        if same.is_some() && *sliced == same {
-            return Ok(Made { file: output, commands, notes: Vec::new() });
+        let known = sliced.get(&output).filter(|known| {
+            let is_same = known.words == words && known.machine == machine;
+            is_same && known.part == part_state && state(&stack).ok() == Some(known.stack)
+        });
+        if let Some(Sliced { notes, .. }) = known {
+            return Ok(Made { file: output, commands, notes: notes.clone() });
         }
         let stages = parse(&[words.clone(), fix], &self.root)
             .map_err(|error| Exit::usage(format!("{}: {}", error.name, error.why)))?;
@@ -157,8 +181,10 @@ impl Chain {
             let mut layers = layers.map(|layer| layer.map_err(Exit::from));
             self.write(&mut layers, &output, progress)
         })?;
-        *sliced = Some(of_stack(state(&self.root.join(&output))?));
-        Ok(Made { file: output, commands, notes: findings.notes() })
+        let (stack, notes) = (state(&stack)?, findings.notes());
+        let made = Sliced { words, machine, part: part_state, stack, notes: notes.clone() };
+        sliced.insert(output.clone(), made);
+        Ok(Made { file: output, commands, notes })
     }
 
     /// Writes layers into a file of the folder, until nobody waits for it any more.
