@@ -238,6 +238,16 @@ fn batches() {
     let states: Vec<_> =
         status["parts"].as_array().unwrap().iter().map(|it| &it["state"]).collect();
     assert_eq!(states, ["failed", "waiting"]);
+    assert_eq!(status["last_failures"], json!([]));
+    let build =
+        "[[build]]\nname = \"small\"\nparts = [\"torus:1\"]\ntile = \"--area 1x1mm --mesh none\"\n";
+    let night = night.replace("[[part]]\nfile = \"bad.stl\"\n", build);
+    scratch.write("night.toml", night.as_bytes());
+    assert_eq!(scratch.run("lamp batch night.toml").statuses, [Some(1)]);
+    let status = answer(&scratch, "lamp batch status night.toml --json");
+    let failure = &status["last_failures"][0];
+    assert_eq!(failure["subject"], "small", "{status}");
+    assert!(failure["why"].as_str().unwrap().contains("1x1mm"), "{status}");
 }
 
 #[test]

@@ -22,8 +22,22 @@ use crate::terminal::progress::printable;
 struct StatusAnswer {
     /// Number of tasks to do.
     tasks_to_do: usize,
+    /// How tasks that are to do failed the last time.
+    last_failures: Vec<LastFailure>,
     #[serde(flatten)]
     summary: Summary,
+}
+
+/// How a task that is to do failed the last time.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct LastFailure {
+    /// The part or the build.
+    subject: String,
+    /// The task.
+    task: String,
+    /// The reason.
+    why: String,
 }
 
 schemas! { "lamp-batch-status-1": StatusAnswer; }
@@ -40,15 +54,18 @@ pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
         text += &told(line);
     }
     let to_do = ledger.keys();
+    let mut last_failures = Vec::new();
     if !to_do.is_empty() {
         // The last words of attempts, the latest of each task.
         let failed = events(&store).map_err(|error| Exit::Failed(error.into()))?;
         let failed = failed.into_iter().filter(|event| !event.is_done());
         let last: BTreeMap<Key, _> = failed.map(|event| (event.key, event)).collect();
         for event in to_do.iter().filter_map(|key| last.get(key)) {
-            let why = event.why.as_deref().unwrap_or("it failed");
+            let why = event.why.clone().unwrap_or_else(|| "it failed".to_owned());
             text += &printable(&format!("{} ({}): last time: {why}", event.subject, event.label));
             text.push('\n');
+            let (subject, task) = (event.subject.clone(), event.label.clone());
+            last_failures.push(LastFailure { subject, task, why });
         }
     }
     if common.verbose {
@@ -69,7 +86,7 @@ pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
         print(&text)?;
     }
     let Some(path) = args.report.path() else { return Ok(()) };
-    let answer = StatusAnswer { tasks_to_do: to_do.len(), summary };
+    let answer = StatusAnswer { tasks_to_do: to_do.len(), last_failures, summary };
     write_answer("lamp-batch-status-1", &answer, path)
 }
 
