@@ -52,6 +52,8 @@ fn check(night: &Night, wanted: &Outcome, ended: &Ended) {
     let (before, after) = first.split_once(": no more tasks are started\n").expect("it is told");
     assert!(before.lines().last().is_some_and(|line| line.contains("No space left")), "{ended:?}");
     let last = "error: batch: the store's disk is full: make room, and run the same command again to go on\n";
+    let (report, after) = after.split_once('\n').expect("two lines");
+    assert!(report.contains("report.html: 4 parts and 1 build, "), "{ended:?}");
     assert_eq!(after, last, "{ended:?}");
     // Finished tasks are not done again.
     let done = |text: &str| text.lines().filter(|line| line.ends_with(" is done")).count();
