@@ -168,9 +168,12 @@ async function tellShown({ fail, picture, play, say, state }) {
   const { stack, layer } = state.view;
   asked.abort();
   asked = new AbortController();
+  // The panels below move when the facts come.
+  byId("layer-facts").ariaBusy = "true";
   try {
     const facts = await get(`/api/stacks/${stack}/layers/${layer}`, asked.signal);
     tellLayer(facts);
+    byId("layer-facts").ariaBusy = "false";
     picture.canvas.setAttribute("aria-label", `Layer picture: ${facts.name}`);
     if (!play.isOn) say(facts.name);
   } catch (error) {

@@ -103,13 +103,16 @@ impl Browser {
         assert_eq!(came.unwrap(), json!(true), "{condition} does not come: {}", message());
     }
 
-    /// Waits until all tiles of the view have come and are drawn.
+    /// Waits until all tiles of the view have come and are drawn, and the facts of the layer, which move
+    /// what is below them: a click would go to another place.
     #[track_caller]
     pub(crate) fn settle(&self) {
         // A change of the view reaches the address and the tiles a moment later.
         std::thread::sleep(Duration::from_millis(250));
         self.wait_for(&format!(
-            "document.querySelector('{CANVAS}')?.ariaBusy === 'false' || document.body.className === 'empty'"
+            "document.querySelector('{CANVAS}')?.ariaBusy === 'false'
+               && document.querySelector('#layer-facts').ariaBusy !== 'true'
+             || document.body.className === 'empty'"
         ));
     }
 
