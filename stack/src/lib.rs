@@ -71,7 +71,7 @@ pub use files::durable::{close, skip_sync, sync};
 pub use files::file_format::{FORMAT_BYTES, FileFormat, PartFormat};
 pub use files::find::{is_stack_name, stacks_in};
 pub use files::folder_list::FOLDER_LIST;
-pub use files::indexed::IndexedStack;
+pub use files::indexed::{FileStamp, IndexedStack};
 pub use files::input::Pages;
 pub use files::join::{JoinError, join};
 pub use files::leftovers::remove_leftovers;

@@ -192,15 +192,16 @@ impl IndexedStack {
     }
 }
 
-/// The facts that show whether a file was written to.
-#[derive(Debug, PartialEq)]
-struct FileStamp {
+/// The facts that show whether a file was written to: its size, and the time of the last change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FileStamp {
     bytes: u64,
     modified: Option<SystemTime>,
 }
 
 impl FileStamp {
-    fn of(file: &Metadata) -> Self {
+    /// Returns the stamp of a file as it is.
+    pub fn of(file: &Metadata) -> Self {
         Self { bytes: file.len(), modified: file.modified().ok() }
     }
 

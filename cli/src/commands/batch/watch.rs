@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{self, Path, PathBuf};
 use std::thread;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use anyhow::Context;
 use lamp_batch::{SubjectSummary, WatchedNames};
+use lamp_stack::FileStamp;
 
 use super::RunArgs;
 use super::night_file::NightFile;
@@ -20,9 +21,6 @@ use crate::terminal::progress::Progress;
 
 /// The time between two looks. Who writes a file adds to it within that time.
 const PAUSE: Duration = Duration::from_secs(2);
-
-/// The state of a file: its size, and when it was changed.
-type Stamp = (u64, Option<SystemTime>);
 
 /// Makes the night, and then each new or changed part of a folder, until a signal ends the process.
 pub(super) fn watch(
@@ -96,11 +94,11 @@ pub(super) fn watch(
 #[derive(Default)]
 struct Watched {
     /// Files at the last look.
-    seen: BTreeMap<PathBuf, Stamp>,
+    seen: BTreeMap<PathBuf, FileStamp>,
     /// Parts that did not change between two looks, as they were then.
-    made: BTreeMap<PathBuf, Stamp>,
+    made: BTreeMap<PathBuf, FileStamp>,
     /// Files that are no parts.
-    others: BTreeMap<PathBuf, Stamp>,
+    others: BTreeMap<PathBuf, FileStamp>,
 }
 
 impl Watched {
@@ -109,7 +107,7 @@ impl Watched {
     fn look(&mut self, folder: &Path, progress: &Progress) -> std::io::Result<bool> {
         let files = FolderEntries::of(folder)?.files;
         let stamped = files.into_iter().filter_map(|file| Some((file.clone(), stamp(&file)?)));
-        let now: BTreeMap<PathBuf, Stamp> = stamped.collect();
+        let now: BTreeMap<PathBuf, FileStamp> = stamped.collect();
         let mut is_new = false;
         for (file, stamp) in &now {
             let is_steady = self.seen.get(file) == Some(stamp);
@@ -140,14 +138,14 @@ impl Watched {
 
     /// Returns the parts that are as they were, and not being written again.
     fn steady(&self) -> Vec<PathBuf> {
-        let is_steady = |(file, stamp): &(&PathBuf, &Stamp)| self.seen.get(*file) == Some(*stamp);
+        let is_steady =
+            |(file, stamp): &(&PathBuf, &FileStamp)| self.seen.get(*file) == Some(*stamp);
         self.made.iter().filter(is_steady).map(|(file, _)| file.clone()).collect()
     }
 }
 
-fn stamp(file: &Path) -> Option<Stamp> {
-    let metadata = fs::metadata(file).ok()?;
-    Some((metadata.len(), metadata.modified().ok()))
+fn stamp(file: &Path) -> Option<FileStamp> {
+    fs::metadata(file).ok().map(|facts| FileStamp::of(&facts))
 }
 
 /// Returns the line of a part or a build.
