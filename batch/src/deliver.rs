@@ -137,11 +137,11 @@ pub fn check_delivered(night: &Night, store: &Store) -> Result<(usize, Vec<Strin
     let (mut whole, mut wrong) = (0, Vec::new());
     for path in parts.chain(builds) {
         let Some(known) = store.note::<Delivered>(note(&path)) else {
-            // An earlier check forgot it, so the file is still as wrong as then.
+            // An earlier check found it wrong and forgot it, or another program wrote it.
             if path.exists() {
                 let place = path.display();
                 wrong.push(format!(
-                    "{place}: it is not as delivered: the next run delivers it again"
+                    "{place}: its delivery is not known: the next run delivers it again"
                 ));
             }
             continue;

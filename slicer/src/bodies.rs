@@ -1,8 +1,8 @@
 //! Decides what is inside a part, from the winding numbers of its bodies.
 //!
 //! A body holds a point where its surface winds around the point. The solids of an object unite,
-//! minus its negative volumes and what later bodies erase; objects and files unite. Files that cut are subtracted, or only
-//! their inside is kept.
+//! minus its negative volumes and what later bodies erase; objects and files unite. Files that cut
+//! are subtracted, or only their inside is kept.
 
 use std::collections::{BTreeMap, HashMap};
 

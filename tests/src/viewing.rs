@@ -59,7 +59,7 @@ impl Viewing {
     /// Opens its address for the cookie.
     ///
     /// # Panics
-    /// Panics if there is none.
+    /// Panics if no cookie comes.
     #[track_caller]
     pub fn open(&mut self) {
         let welcome = self.ask(&self.request(&format!("/?token={}", self.token()), ""));
