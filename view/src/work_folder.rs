@@ -6,9 +6,8 @@ use std::io::{self, Read, Write};
 use std::num::NonZeroU32;
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::SystemTime;
 
-use lamp_stack::{FileBeside, IndexedStack, digest_of};
+use lamp_stack::{FileBeside, FileStamp, IndexedStack, digest_of};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -112,7 +111,7 @@ pub trait Workshop: Send + Sync {
     ///
     /// # Errors
     /// Returns a sentence for people.
-    fn make(&self, order: &Order, progress: &WorkProgress) -> Result<Made, String>;
+    fn make(&self, folder: &Path, order: &Order, progress: &WorkProgress) -> Result<Made, String>;
 
     /// Finds what a person should look at in a stack that came of an order.
     ///
@@ -120,6 +119,7 @@ pub trait Workshop: Send + Sync {
     /// Returns a sentence for people.
     fn find(
         &self,
+        folder: &Path,
         order: &Order,
         stack: &ViewedStack,
         progress: &WorkProgress,
@@ -132,7 +132,7 @@ pub struct WorkFolder {
     workshop: Box<dyn Workshop>,
     job: Mutex<Option<Job>>,
     /// The files that orders wrote, each with the file that it was made of.
-    products: Mutex<HashMap<String, (String, FileState)>>,
+    products: Mutex<HashMap<String, (String, FileStamp)>>,
     /// Held while a file gets its name, so that none is replaced unseen.
     naming: Mutex<()>,
 }
@@ -143,9 +143,6 @@ struct Job {
     order: Order,
     result: Arc<Background<Made>>,
 }
-
-/// The size and time of a file, which change when the file does.
-type FileState = (u64, Option<SystemTime>);
 
 /// The most files that the page lists.
 const MOST_FILES: usize = 10_000;
@@ -203,13 +200,13 @@ impl WorkFolder {
         Ok(files.into_iter().map(file).collect())
     }
 
-    /// Returns the state of a file of the folder; `None` if it is not there.
+    /// Returns the stamp of a file of the folder; `None` if it is not there.
     ///
     /// # Errors
     /// Returns an error if something else has the name: it would be written through.
-    fn state_of(&self, name: &str) -> Result<Option<FileState>, ViewError> {
+    fn stamp_of(&self, name: &str) -> Result<Option<FileStamp>, ViewError> {
         match fs::symlink_metadata(self.folder.join(name)) {
-            Ok(facts) if facts.is_file() => Ok(Some((facts.len(), facts.modified().ok()))),
+            Ok(facts) if facts.is_file() => Ok(Some(FileStamp::of(&facts))),
             Ok(_) => {
                 let text = format!("{name} in the folder is no file: rename it, or remove it");
                 Err(ViewError::Refused(text))
@@ -248,11 +245,11 @@ impl WorkFolder {
         }
         let path = self.folder.join(name);
         let failed = |error| self.failed(name, &error);
-        self.state_of(name)?;
+        self.stamp_of(name)?;
         let beside = FileBeside::new(&path).map_err(failed)?;
         copy(bytes, &beside.file()).map_err(failed)?;
         let _naming = self.naming.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.state_of(name)?.is_some() && !replace {
+        if self.stamp_of(name)?.is_some() && !replace {
             let digest = |mut file: &File| {
                 io::Seek::rewind(&mut file)?;
                 digest_of(file)
@@ -291,7 +288,7 @@ impl WorkFolder {
             let Job { order, result } = job;
             result.run(|progress| {
                 let clean = |text: String| folder.without_paths(&text);
-                let made = folder.workshop.make(&order, progress);
+                let made = folder.workshop.make(&folder.folder, &order, progress);
                 folder.note_products(&order);
                 let made = made.map_err(clean)?;
                 let path = folder.folder.join(&made.file);
@@ -300,7 +297,7 @@ impl WorkFolder {
                 let viewer = Arc::new(next(vec![ViewedStack::new(&made.file, pages)]));
                 let own = Arc::clone(&folder);
                 viewer.find(move |stack, progress| {
-                    let found = own.workshop.find(&order, stack, progress);
+                    let found = own.workshop.find(&own.folder, &order, stack, progress);
                     found.map_err(|why| own.without_paths(&why))
                 });
                 show(viewer);
@@ -330,9 +327,9 @@ impl WorkFolder {
         }
         let products = self.products.lock().unwrap_or_else(PoisonError::into_inner);
         for name in self.workshop.products(order) {
-            let state = self.state_of(&name)?;
+            let stamp = self.stamp_of(&name)?;
             let known = products.get(&name).filter(|(of, _)| *of == order.file);
-            if state.is_some() && state != known.map(|(_, state)| *state) && !order.replace {
+            if stamp.is_some() && stamp != known.map(|(_, stamp)| *stamp) && !order.replace {
                 return Err(ViewError::Taken(name));
             }
         }
@@ -343,8 +340,8 @@ impl WorkFolder {
     fn note_products(&self, order: &Order) {
         let mut products = self.products.lock().unwrap_or_else(PoisonError::into_inner);
         for name in self.workshop.products(order) {
-            if let Ok(Some(state)) = self.state_of(&name) {
-                products.insert(name, (order.file.clone(), state));
+            if let Ok(Some(stamp)) = self.stamp_of(&name) {
+                products.insert(name, (order.file.clone(), stamp));
             }
         }
     }
@@ -358,6 +355,10 @@ impl WorkFolder {
 
     /// Names files without the folder: answers hold no paths.
     fn without_paths(&self, text: &str) -> String {
+        if self.folder.parent().is_none() {
+            // Every path is in it, and its name stands in other words, too.
+            return text.to_owned();
+        }
         let folder = self.folder.display().to_string();
         text.replace(&format!("{folder}{MAIN_SEPARATOR}"), "").replace(&folder, "the folder")
     }
@@ -419,12 +420,13 @@ mod tests {
             vec![format!("{}.tif", order.file)]
         }
 
-        fn make(&self, _: &Order, _: &WorkProgress) -> Result<Made, String> {
+        fn make(&self, _: &Path, _: &Order, _: &WorkProgress) -> Result<Made, String> {
             Err("nothing is made".to_owned())
         }
 
         fn find(
             &self,
+            _: &Path,
             _: &Order,
             _: &ViewedStack,
             _: &WorkProgress,
@@ -461,7 +463,10 @@ mod tests {
             "a\0.stl",
             "a\n.stl",
             "c:a.stl",
-            &"a".repeat(201),
+            "con.stl",
+            "COM1.stl",
+            "a\u{202e}lts.stl",
+            &"a".repeat(256),
         ] {
             assert!(folder.keep(name, &b"new"[..], true).is_err(), "{name:?}");
             assert_eq!(folder.open(name).unwrap_err(), ViewError::NoSuch("file"), "{name:?}");

@@ -49,7 +49,7 @@ pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
             async move {
                 match is_there {
                     true => next.run(request).await,
-                    false => ViewError::Changed(OTHER.to_owned()).into_response(),
+                    false => ViewError::Changed(OTHER_STACK.to_owned()).into_response(),
                 }
             }
         }))
@@ -75,7 +75,7 @@ pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
 }
 
 /// The refusal of pages that show other stacks.
-const OTHER: &str = "another stack is shown: load this page again";
+const OTHER_STACK: &str = "another stack is shown: load this page again";
 
 /// The most bytes of an order.
 const MOST_ORDER: usize = 16 << 10;

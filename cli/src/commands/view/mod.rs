@@ -98,8 +98,8 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
         [] if args.work.is_none() => &[PathBuf::from("-")],
         inputs => inputs,
     };
-    let finds = args.check || !args.findings.is_empty() || !args.report.is_empty();
-    if inputs.is_empty() && finds {
+    let has_report = !(args.findings.is_empty() && args.report.is_empty());
+    if inputs.is_empty() && (args.check || has_report) {
         return Err(Exit::usage("findings are of a stack: name one, or leave out the option"));
     }
     let slicing = SliceSettings::try_from(&args.slicing)?;
@@ -131,7 +131,7 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
             let found = find(&CheckSettings::default(), stack, progress);
             found.map_err(|error| error.to_string())
         });
-    } else if !(args.findings.is_empty() && args.report.is_empty()) {
+    } else if has_report {
         if !args.report.is_empty() {
             Severity::Warning.say("view: findings to show are named by --findings");
         }

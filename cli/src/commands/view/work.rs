@@ -3,15 +3,14 @@
 use std::collections::HashMap;
 use std::fs;
 use std::num::NonZeroU32;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use std::time::SystemTime;
 
 use anyhow::{Context, anyhow};
 use lamp_machine::Machine;
 use lamp_pipeline::documents::{document, document_and_word, own_names};
 use lamp_pipeline::watcher::KeptRemarks;
-use lamp_stack::{Catalogued, Layer, Pages, StackError, StackFormat, quoted};
+use lamp_stack::{Catalogued, FileStamp, Layer, StackFormat, quoted};
 use lamp_view::{
     BuildOrder, Finding, FormatChoice, InputKind, MachineChoice, Made, Order, ViewedStack,
     WorkFolder, WorkProgress, Workshop,
@@ -32,32 +31,25 @@ pub(super) fn folder(path: &Path) -> Result<WorkFolder, Exit> {
     if !path.exists() {
         fs::create_dir(path).with_context(name)?;
     }
-    // Paths in orders are joined to it, whatever becomes of the current folder.
-    let root = fs::canonicalize(path).with_context(name)?;
-    let chain = Chain { root, sliced: Mutex::default() };
-    Ok(WorkFolder::new(path, Box::new(chain)).with_context(name)?)
+    Ok(WorkFolder::new(path, Box::new(Chain::default())).with_context(name)?)
 }
 
 /// `slice | fix`, then `tile`, in a folder.
+#[derive(Default)]
 struct Chain {
-    root: PathBuf,
     /// The stacks that were sliced, by their names: a build of the same part needs no second one.
     sliced: Mutex<HashMap<String, Sliced>>,
 }
 
 /// A stack, what it was made of, and how.
-#[derive(Clone, PartialEq)]
 struct Sliced {
     words: Vec<String>,
     /// The machine's name with the digest of its text.
     machine: Option<String>,
-    part: FileState,
-    stack: FileState,
+    part: FileStamp,
+    stack: FileStamp,
     notes: Vec<String>,
 }
-
-/// The size and time of a file, which change when the file does.
-type FileState = (u64, SystemTime);
 
 impl Workshop for Chain {
     fn machines(&self) -> Vec<MachineChoice> {
@@ -99,39 +91,41 @@ impl Workshop for Chain {
     }
 
     fn products(&self, order: &Order) -> Vec<String> {
-        let name = stem(&order.file);
         let is_part = self.kind_of(order.file.as_ref()) != Some(InputKind::Stack);
-        let layers = is_part.then(|| format!("{name}-layers.tif"));
-        let build = order.build.as_ref().map(|build| format!("{name}-build.{}", build.ending));
-        layers.into_iter().chain(build).collect()
+        let layers = is_part.then(|| layers_name(order));
+        layers
+            .into_iter()
+            .chain(order.build.as_ref().map(|build| build_name(order, build)))
+            .collect()
     }
 
-    fn make(&self, order: &Order, progress: &WorkProgress) -> Result<Made, String> {
-        self.made(order, progress).map_err(|error| error.to_string())
+    fn make(&self, folder: &Path, order: &Order, progress: &WorkProgress) -> Result<Made, String> {
+        self.made(folder, order, progress).map_err(|error| error.to_string())
     }
 
     fn find(
         &self,
+        folder: &Path,
         order: &Order,
         stack: &ViewedStack,
         progress: &WorkProgress,
     ) -> Result<Vec<Finding>, String> {
         let machine = option("machine", order.machine.as_deref());
-        let settings = parse_check(&machine.collect::<Vec<_>>(), &self.root)?;
+        let settings = parse_check(&machine.collect::<Vec<_>>(), folder)?;
         find(&settings, stack, progress).map_err(|error| error.to_string())
     }
 }
 
 impl Chain {
-    fn made(&self, order: &Order, progress: &WorkProgress) -> Result<Made, Exit> {
-        let mut made = self.stack(order, progress)?;
+    fn made(&self, folder: &Path, order: &Order, progress: &WorkProgress) -> Result<Made, Exit> {
+        let mut made = self.stack(folder, order, progress)?;
         let Some(build) = &order.build else { return Ok(made) };
-        let output = format!("{}-build.{}", stem(&order.file), build.ending);
+        let output = build_name(order, build);
         let (options, copies) = (tile_options(order, build), build.copies.map(NonZeroU32::get));
-        let tiling = Tiling::parse(&options, &[copies], &self.root).map_err(Exit::usage)?;
+        let tiling = Tiling::parse(&options, &[copies], folder).map_err(Exit::usage)?;
         progress.begin("laying out the build");
-        let stacks = [(self.root.join(&made.file), copies)];
-        let notes = tiling.run(&stacks, &mut |layers| self.write(layers, &output, progress))?;
+        let (stacks, to) = ([(folder.join(&made.file), copies)], folder.join(&output));
+        let notes = tiling.run(&stacks, &mut |layers| write(layers, &to, progress))?;
         let copies = copies.map_or_else(String::new, |copies| format!(":{copies}"));
         let words = ["tile".to_owned(), format!("{}{copies}", made.file)];
         let words = words.into_iter().chain(options).chain(["-o".to_owned(), output.clone()]);
@@ -141,10 +135,9 @@ impl Chain {
     }
 
     /// Returns the stack of an order's file: the file itself, or what its part is sliced into.
-    fn stack(&self, order: &Order, progress: &WorkProgress) -> Result<Made, Exit> {
-        let (name, part) = (order.file.clone(), self.root.join(&order.file));
-        let is_stack = !matches!(Pages::open(&part), Err(StackError::NotTiff { .. }));
-        if is_stack && self.kind_of(name.as_ref()) != Some(InputKind::Part) {
+    fn stack(&self, folder: &Path, order: &Order, progress: &WorkProgress) -> Result<Made, Exit> {
+        let (name, part) = (order.file.clone(), folder.join(&order.file));
+        if self.kind_of(name.as_ref()) == Some(InputKind::Stack) {
             let mut given = ["dpi", "thickness", "rotate"].into_iter().zip(slice_values(order));
             if let Some((option, _)) = given.find(|(_, value)| value.is_some()) {
                 return Err(Exit::usage(format!(
@@ -153,67 +146,76 @@ impl Chain {
             }
             return Ok(Made { file: name, commands: Vec::new(), notes: Vec::new() });
         }
-        let output = format!("{}-layers.tif", stem(&name));
+        let output = layers_name(order);
         let (words, fix) = (slice_words(order), vec!["fix".to_owned()]);
         let mut typed_slice = words.clone();
         typed_slice.insert(1, name.clone());
         let fix_to = [fix.clone(), vec!["-o".to_owned(), output.clone()]].concat();
         let commands = vec![format!("{} | {}", typed(&typed_slice), typed(&fix_to))];
-        let state = |path: &Path| -> Result<FileState, Exit> {
-            let facts = fs::metadata(path).and_then(|facts| Ok((facts.len(), facts.modified()?)));
-            Ok(facts.with_context(|| path.display().to_string())?)
+        let stamp = |path: &Path| -> Result<FileStamp, Exit> {
+            let facts = fs::metadata(path).with_context(|| path.display().to_string())?;
+            Ok(FileStamp::of(&facts))
         };
         let word = |name: &String| document_and_word::<Machine>(name.as_ref()).map(|it| it.1);
         let machine = order.machine.as_ref().map(word).transpose()?;
-        let (part_state, stack) = (state(&part)?, self.root.join(&output));
+        let (of_part, stack) = (stamp(&part)?, folder.join(&output));
         let mut sliced = self.sliced.lock().unwrap_or_else(PoisonError::into_inner);
         let known = sliced.get(&output).filter(|known| {
             let is_same = known.words == words && known.machine == machine;
-            is_same && known.part == part_state && state(&stack).ok() == Some(known.stack)
+            is_same && known.part == of_part && stamp(&stack).ok() == Some(known.stack)
         });
         if let Some(Sliced { notes, .. }) = known {
             return Ok(Made { file: output, commands, notes: notes.clone() });
         }
-        let stages = parse(&[words.clone(), fix], &self.root)
+        let stages = parse(&[words.clone(), fix], folder)
             .map_err(|error| Exit::usage(format!("{}: {}", error.name, error.why)))?;
         progress.begin("slicing");
         let findings = stages.chain.run(&part, &name, 0..u32::MAX, |layers| {
             let mut layers = layers.map(|layer| layer.map_err(Exit::from));
-            self.write(&mut layers, &output, progress)
+            write(&mut layers, &stack, progress)
         })?;
-        let (stack, notes) = (state(&stack)?, findings.notes());
-        let made = Sliced { words, machine, part: part_state, stack, notes: notes.clone() };
+        let (stack, notes) = (stamp(&stack)?, findings.notes());
+        let made = Sliced { words, machine, part: of_part, stack, notes: notes.clone() };
         sliced.insert(output.clone(), made);
         Ok(Made { file: output, commands, notes })
     }
+}
 
-    /// Writes layers into a file of the folder, until nobody waits for it any more.
-    fn write(
-        &self,
-        layers: &mut dyn Iterator<Item = Result<Layer, Exit>>,
-        output: &str,
-        progress: &WorkProgress,
-    ) -> Result<(), Exit> {
-        let counted = layers.map(|layer| {
-            let layer = layer?;
-            if progress.is_stopped() {
-                return Err(Exit::Failed(anyhow!("it was stopped")));
-            }
-            if let Some(count) = layer.info.stack.as_ref().and_then(|stack| stack.layers) {
-                progress.expect(u64::from(count));
-            }
-            progress.one_done();
-            Ok(layer)
-        });
-        let output = Output {
-            output: self.root.join(output),
-            format: None,
-            classic: false,
-            packbits: false,
-            force: false,
-        };
-        write_layers(counted, &output, &Progress::keeping("view", &KeptRemarks::default()))
-    }
+/// Writes layers into a file, until nobody waits for it any more.
+fn write(
+    layers: &mut dyn Iterator<Item = Result<Layer, Exit>>,
+    to: &Path,
+    progress: &WorkProgress,
+) -> Result<(), Exit> {
+    let counted = layers.map(|layer| {
+        let layer = layer?;
+        if progress.is_stopped() {
+            return Err(Exit::Failed(anyhow!("it was stopped")));
+        }
+        if let Some(count) = layer.info.stack.as_ref().and_then(|stack| stack.layers) {
+            progress.expect(u64::from(count));
+        }
+        progress.one_done();
+        Ok(layer)
+    });
+    let output = Output {
+        output: to.to_owned(),
+        format: None,
+        classic: false,
+        packbits: false,
+        force: false,
+    };
+    write_layers(counted, &output, &Progress::keeping("view", &KeptRemarks::default()))
+}
+
+/// Returns the name of the stack that an order's part is sliced into.
+fn layers_name(order: &Order) -> String {
+    format!("{}-layers.tif", stem(&order.file))
+}
+
+/// Returns the name of an order's build.
+fn build_name(order: &Order, build: &BuildOrder) -> String {
+    format!("{}-build.{}", stem(&order.file), build.ending)
 }
 
 /// Returns the name of a file without its ending.
