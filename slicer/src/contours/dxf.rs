@@ -82,6 +82,12 @@ impl Entity {
         Ok(self.number_or(code, 0.0)? as u32)
     }
 
+    /// Returns whether groups of these codes, which are widths, are above zero.
+    fn is_wide(&self, codes: &[i32]) -> Result<bool, ContourFault> {
+        let mut widths = self.groups.iter().filter(|(code, _)| codes.contains(code));
+        widths.try_fold(false, |is_wide, (_, width)| Ok(is_wide | (finite(width)? > 0.0)))
+    }
+
     /// Returns whether it lies in a plane seen from below, so that its x points left.
     fn is_mirrored(&self) -> Result<bool, ContourFault> {
         let normal = [210, 220].map(|code| self.number_or(code, 0.0));
@@ -115,6 +121,10 @@ struct DxfReader<R> {
     hidden_layers: HashSet<String>,
     hidden: u64,
     others: u64,
+    /// Polylines with a width, whose outlines are read without it.
+    wide: u64,
+    /// Whether the polyline whose vertices are read has a width.
+    is_wide: bool,
 }
 
 /// Reads a drawing. Masks have a thickness in millimeters.
@@ -132,6 +142,8 @@ pub(super) fn read(text: impl BufRead, mask_mm: f64) -> io::Result<Result<Opened
         hidden_layers: HashSet::new(),
         hidden: 0,
         others: 0,
+        wide: 0,
+        is_wide: false,
     };
     let outcome = reader.read()?;
     let at = |fault| (format!("line {}", reader.line), fault);
@@ -268,6 +280,7 @@ impl<R: BufRead> DxfReader<R> {
             }
             "SEQEND" => {
                 if let Some(line) = self.polyline.take() {
+                    self.wide += u64::from(self.is_wide);
                     self.current_block().lines.push(line);
                 }
                 return Ok(());
@@ -277,6 +290,7 @@ impl<R: BufRead> DxfReader<R> {
                 let is_corner = entity.flags(70)? & 16 == 0;
                 let [x, y] = entity.point(10)?;
                 let (bulge, z) = (entity.number_or(42, 0.0)?, entity.number(30)?);
+                self.is_wide |= entity.is_wide(&[40, 41])?;
                 if let Some(line) = self.polyline.as_mut().filter(|_| is_corner) {
                     line.corners.push([x, y, bulge]);
                     line.z = z.unwrap_or(line.z);
@@ -295,12 +309,14 @@ impl<R: BufRead> DxfReader<R> {
                 }
                 line.is_closed = flags & 1 == 1;
                 line.z = entity.number_or(30, 0.0)?;
+                self.is_wide = entity.is_wide(&[40, 41])?;
                 self.polyline = Some(line);
                 return Ok(());
             }
             "LWPOLYLINE" => {
                 line.is_closed = entity.flags(70)? & 1 == 1;
                 line.z = entity.number_or(38, 0.0)?;
+                self.wide += u64::from(entity.is_wide(&[40, 41, 43])?);
                 for (code, value) in &entity.groups {
                     match (code, line.corners.last_mut()) {
                         (10, _) => line.corners.push([finite(value)?, 0.0, 0.0]),
@@ -431,6 +447,11 @@ impl<R: BufRead> DxfReader<R> {
             "entities on paper or on layers that are off or frozen",
         ];
         ReadNote::leave_out(&mut notes, what, self.hidden);
+        let what = [
+            "width of a polyline, whose outline is read,",
+            "widths of polylines, whose outlines are read,",
+        ];
+        ReadNote::leave_out(&mut notes, what, self.wide);
         closed.sort_by(|a, b| a.1.total_cmp(&b.1));
         // Heights that differ by less are rounded.
         let nm = 1e-6 / unit_mm;

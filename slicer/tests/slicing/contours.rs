@@ -757,7 +757,7 @@ fn contents_that_a_drawing_hides_are_left_out() {
     };
     let dxf = format!(
         "0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLAYER\n0\nLAYER\n2\noff\n70\n0\n62\n-7\n0\nLAYER\n2\nfrozen\n70\n1\n62\n7\n0\nENDTAB\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n{}{}{}{}0\nENDSEC\n0\nEOF\n",
-        square(0, "8\nshown\n"),
+        square(0, "8\nshown\n43\n0.25\n"),
         square(2, "8\noff\n"),
         square(4, "8\nfrozen\n"),
         square(6, "8\nshown\n67\n1\n"),
@@ -767,6 +767,8 @@ fn contents_that_a_drawing_hides_are_left_out() {
     let notes: Vec<String> =
         open(dxf.as_bytes()).unwrap().notes().iter().map(ReadNote::to_string).collect();
     assert!(notes[1].starts_with("3 entities on paper or on layers that are off"), "{notes:?}");
+    let wide = "1 width of a polyline, whose outline is read, is left out";
+    assert!(notes[2].starts_with(wide), "{notes:?}");
     let svg = |body: &str| {
         format!(
             "<svg width='40mm' height='40mm' viewBox='0 0 40 40'><rect width='3' height='2'/>{body}</svg>"
