@@ -8,7 +8,7 @@
 //! - [`dither`] turns gray layers into dots, for machines that expose a pixel or not: a gray level
 //!   becomes the share of white pixels (002 section 3.3.1). Black and white stay as they are, so no
 //!   dot appears outside the part. [`homogeneity`] reports whether the resin averages dots of a
-//!   size.
+//!   size; a [`CoarseScreen`] has cells that it does not average.
 //! - [`CuredLine`] simulates what a stack cures, layer by layer, [`SummedLine`] where doses add up
 //!   down each [`ColumnDose`]. [`shared_height`] compares that with a part.
 //!
@@ -29,6 +29,7 @@
 
 mod blue_noise;
 pub mod calibrate;
+mod coarse;
 mod column_dose;
 mod cured;
 mod diffusion;
@@ -47,6 +48,7 @@ mod threshold;
 #[cfg(test)]
 mod void_and_cluster;
 
+pub use coarse::CoarseScreen;
 pub use column_dose::{ColumnDose, Fades, ResinDepths};
 pub use cured::{CuredLine, LineRun, PixelLine, SolidHeights, add_below, excess};
 pub use dither::{DitherError, DitherMethod, dither, dither_image};

@@ -123,7 +123,7 @@ impl Working<'_> {
                 let moved = compensating.layers::<Error>(decoded, range);
                 Box::new(moved.map(|layer| layer.map(PassingLayer::from)))
             }
-            Self::Dither(settings, watcher) => Box::new(settings.layers(layers, &**watcher)),
+            Self::Dither(settings, watcher) => Box::new(settings.layers(layers, &**watcher)?),
             Self::Edit(editing, remarks) => {
                 let noting = |pages: Pages, path: &Path| {
                     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();

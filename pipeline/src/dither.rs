@@ -1,22 +1,45 @@
 //! The stage that turns gray layers into dots.
 
-use lamp_grayscale::{DitherError, DitherMethod, EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
-use lamp_stack::{Length, PassingLayer, Pitch, StackError};
+use lamp_grayscale::{
+    CoarseScreen, DitherError, DitherMethod, EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity,
+};
+use lamp_stack::{DitherRecord, Length, PassingLayer, Pitch, StackError, map_in_order};
 use serde::{Deserialize, Serialize};
 
+use crate::error::Error;
+use crate::inside::{Unplaced, surrounded};
 use crate::watcher::{Remark, Watcher};
-use crate::words::{text, words_of};
+use crate::words::{optional, text, words_of};
 
 /// Changes when the same settings and layers give other bytes.
 pub const CODE: u32 = 3;
 
 /// How dots are made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct DitherSettings {
     /// The method.
     #[serde(with = "text")]
     pub method: DitherMethod,
+    /// The side of the cells inside parts.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub cell: Option<Length>,
+    /// The share of white cells.
+    #[serde(with = "text", skip_serializing_if = "is_half")]
+    pub cell_level: f64,
+    /// The least distance between cells and surfaces.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub cell_clearance: Option<Length>,
+}
+
+fn is_half(share: &f64) -> bool {
+    *share == 0.5
+}
+
+impl Default for DitherSettings {
+    fn default() -> Self {
+        Self { method: DitherMethod::default(), cell: None, cell_level: 0.5, cell_clearance: None }
+    }
 }
 
 impl DitherSettings {
@@ -25,12 +48,17 @@ impl DitherSettings {
         format!("dither{}", words_of(self))
     }
 
-    /// Returns the layers as dots, and warns once if they may cure unevenly. Masks are not decoded.
-    pub fn layers<'a, E: From<DitherError> + From<StackError> + Send + 'a>(
+    /// Returns the layers as dots, and warns once if they may cure unevenly. Masks are not decoded, unless
+    /// parts get cells inside.
+    ///
+    /// # Errors
+    /// Returns an error if the settings of cells contradict each other. The layers' errors are those of
+    /// reading and dithering them, and of layers with cells that do not state their place.
+    pub fn layers<'a, E: From<DitherError> + From<StackError> + From<Error> + Send + 'a>(
         &self,
         layers: impl Iterator<Item = Result<PassingLayer, E>> + 'a,
         watcher: &'a dyn Watcher,
-    ) -> impl Iterator<Item = Result<PassingLayer, E>> + 'a {
+    ) -> Result<impl Iterator<Item = Result<PassingLayer, E>> + 'a, Error> {
         // A threshold makes no dots that could cure unevenly.
         let mut has_warned = self.method == DitherMethod::Threshold;
         let layers = layers.inspect(move |layer| {
@@ -42,7 +70,75 @@ impl DitherSettings {
                 watcher.remark(Remark::note(line));
             }
         });
-        lamp_grayscale::dither(layers, self.method)
+        let layers: Box<dyn Iterator<Item = Result<PassingLayer, E>> + 'a> = match self.screen()? {
+            Some((screen, clearance)) => {
+                if homogeneity(screen.cell) == Homogeneity::Unknown {
+                    watcher.remark(Remark::note(format!(
+                        "dots of {} um cured evenly, dots of {} um did not; whether cells of {} um do is \
+                         untested",
+                        short(EVEN_DOTS), short(UNEVEN_DOTS), short(screen.cell)
+                    )));
+                }
+                Box::new(with_cells(layers, screen, clearance))
+            }
+            None => Box::new(layers),
+        };
+        Ok(lamp_grayscale::dither(layers, self.method))
+    }
+
+    /// Returns the screen inside parts, and its distance to surfaces.
+    fn screen(&self) -> Result<Option<(CoarseScreen, Length)>, Error> {
+        let (cell, clearance) = match (self.cell, self.cell_clearance) {
+            (Some(cell), Some(clearance)) => (cell, clearance),
+            (None, None) if is_half(&self.cell_level) => return Ok(None),
+            _ => {
+                let sentence = "--cell needs --cell-clearance: how near to a surface may cells be?";
+                return Err(Error::settings(sentence));
+            }
+        };
+        if homogeneity(cell) == Homogeneity::Even {
+            return Err(Error::settings(format!(
+                "--cell {cell}: cells of {} um or less cure evenly, so no resin between them stays \
+                 liquid: give a wider cell, such as {UNEVEN_DOTS}",
+                short(EVEN_DOTS)
+            )));
+        }
+        if clearance.um() <= 0.0 {
+            return Err(Error::settings("--cell-clearance must be above zero"));
+        }
+        let level = (self.cell_level * 255.0).round() as u8;
+        Ok(Some((CoarseScreen { cell, level }, clearance)))
+    }
+}
+
+/// Gives the white inside of parts the cells of a screen.
+fn with_cells<E: From<StackError> + From<Error> + Send>(
+    layers: impl Iterator<Item = Result<PassingLayer, E>>,
+    screen: CoarseScreen,
+    clearance: Length,
+) -> impl Iterator<Item = Result<PassingLayer, E>> {
+    let decoded = map_in_order(layers, |layer: PassingLayer| Ok(layer.decode()?));
+    let placed = surrounded(decoded.map(|layer| layer.map_err(Failure)), clearance);
+    map_in_order(placed.map(|layer| layer.map_err(|Failure(error)| error)), move |surrounded| {
+        let inside = surrounded.inside(clearance);
+        let (mut layer, pitch) = (surrounded.layer, surrounded.pitch);
+        if inside.change_count() > 0 {
+            layer.image = screen.screened(&layer.image, &inside, pitch, layer.info.index).into();
+            layer.info.set_record(&DitherRecord(format!("cells of {}", screen.cell)));
+        }
+        Ok(layer.into())
+    })
+}
+
+/// An error of the layers, or of a layer without a place.
+struct Failure<E>(E);
+
+impl<E: From<Error>> From<Unplaced> for Failure<E> {
+    fn from(unplaced: Unplaced) -> Self {
+        Self(E::from(Error::work(format!(
+            "layer {} does not state its resolution, height and thickness: --cell needs all three",
+            unplaced.layer
+        ))))
     }
 }
 

@@ -36,6 +36,7 @@ mod error;
 mod fallback;
 mod findings;
 mod fix_report;
+mod inside;
 mod names;
 mod overlaps;
 mod pixel_location;

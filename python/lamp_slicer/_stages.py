@@ -75,9 +75,23 @@ def dither(
     method: Optional[
         Literal["blue-noise", "ordered", "floyd-steinberg", "sierra-lite", "threshold"]
     ] = None,
+    cell: Optional[str] = None,
+    cell_clearance: Optional[str] = None,
+    cell_level: Optional[float] = None,
 ) -> Layers:
-    """Turns gray layers into dots; others pass unchanged."""
-    return _native.dither(layers, {"method": method})
+    """Turns gray layers into dots; others pass unchanged.
+
+    cell: side of the square cells that screen the inside of parts, such as "85um".
+    cell_clearance: least distance between cells and surfaces, such as "1mm".
+    cell_level: share of cells that are white, from 0 to 1; a half.
+    """
+    keywords = {
+        "method": method,
+        "cell": cell,
+        "cell_clearance": cell_clearance,
+        "cell_level": cell_level,
+    }
+    return _native.dither(layers, keywords)
 
 
 def compensate(

@@ -94,6 +94,20 @@ pub(crate) struct DitherStageArgs {
         "No dots: levels from 128 to 255 are white",
     ]))]
     method: DitherMethod,
+
+    /// Screen the inside of parts with square cells of this side, wider than the resin averages, for
+    /// example 85um: uncured resin in black cells relieves stress
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, requires = "cell_clearance")]
+    pub(crate) cell: Option<Length>,
+
+    /// Least distance between cells and the part's surfaces, also those above and below
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, requires = "cell")]
+    cell_clearance: Option<Length>,
+
+    /// Share of cells that are white
+    #[arg(long, value_name = "SHARE", default_value = "50%", value_parser = parse_percent)]
+    #[arg(requires = "cell")]
+    cell_level: f64,
 }
 
 /// The findings to look for, and their limits.
@@ -325,7 +339,8 @@ impl From<&CompensateStageArgs> for CompensateSettings {
 
 impl From<&DitherStageArgs> for DitherSettings {
     fn from(args: &DitherStageArgs) -> Self {
-        Self { method: args.method }
+        let DitherStageArgs { method, cell, cell_clearance, cell_level } = *args;
+        Self { method, cell, cell_level, cell_clearance }
     }
 }
 

@@ -25,6 +25,7 @@ Examples:
   slice blade.stl | fix | dither | tile > build.tif
   dither gray.tif --layers 100..200 -o dots.tif
   dither gray.tif --method floyd-steinberg -o dots.tif
+  dither blade.tif --cell 85um --cell-clearance 1mm -o relaxed.tif
   dither scans/ --method threshold -o masks/
   dither strips/ -o dots/")]
 pub(crate) struct DitherArgs {
@@ -39,10 +40,16 @@ pub(crate) struct DitherArgs {
 }
 
 pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Exit> {
+    if args.settings.cell.is_some() && args.input.layers.is_some() {
+        return Err(Exit::usage(
+            "--cell looks at the layers above and below: leave out --layers, and take layers from the \
+             result with lamp split",
+        ));
+    }
     let progress = progress("dither", common, &args.output);
     let layers = read_stack_or_fields(&args.input, &progress)?;
     let settings = DitherSettings::from(&args.settings);
-    let dots = settings.layers(layers, &progress);
+    let dots = settings.layers(layers, &progress)?;
     // Dots on ramps would be dots of each side alone.
     let by_comb = |form| FieldForm { seam: Seam::Comb, ..form };
     write_stack_or_fields(dots, &args.input, by_comb, &args.output, &progress)

@@ -128,7 +128,14 @@ pub fn offset_one_bit(mask: &Mask, inwards: f64) -> Mask {
     if inwards < 0.0 {
         return grow_one_bit(mask, [-inwards; 2]);
     }
-    let reach = Reach::nearer([inwards + 0.5; 2], mask.height());
+    shrink_one_bit(mask, [inwards; 2])
+}
+
+/// Moves all edges of a mask inwards by distances in pixels along x and y, as [`offset_one_bit`]
+/// does by one: pixels stay white unless a black pixel's middle, or a middle outside the image, is in
+/// an ellipse around their own, of half axes that are half a pixel longer than the distances.
+pub fn shrink_one_bit(mask: &Mask, by: [f64; 2]) -> Mask {
+    let reach = Reach::nearer(by.map(|by| by + 0.5), mask.height());
     let [width, height] = [mask.width() as i32, mask.height() as i32];
     reach.grown(&RowRuns::black_around(mask), -1, width, height).mask(mask.width()).inverted()
 }
