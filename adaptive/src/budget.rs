@@ -41,12 +41,12 @@ impl HeightSearch<'_> {
         }
         let mut known = KnownLayers::new();
         let (bound, climb) = self.smallest_bound(&grid, budget, &mut known);
-        Ok((bound, self.placed(&grid, climb, &known, bound, Some(budget))))
+        Ok((bound, self.placed(&grid, climb, &known, &bound.into(), Some(budget))))
     }
 
     /// Returns the cost of the layers if no error is too large.
     fn least_cost(&self, grid: &StepGrid<'_>, budget: Budget<'_>) -> f64 {
-        let (mut step, mut cost) = (0, 0.0);
+        let (mut step, mut cost, unbounded) = (0, 0.0, f64::INFINITY.into());
         while step < grid.end() {
             let choices = self.thicknesses.choices(step, grid.ends());
             let layers: Vec<SweptLayer> = choices
@@ -56,7 +56,7 @@ impl HeightSearch<'_> {
                     ..SweptLayer::default()
                 })
                 .collect();
-            let chosen = self.choose(&layers, f64::INFINITY, Some(budget));
+            let chosen = self.choose(&layers, &unbounded, Some(budget));
             cost += budget.of(&layers[chosen]);
             step += choices[chosen];
         }
@@ -71,7 +71,7 @@ impl HeightSearch<'_> {
         known: &mut KnownLayers,
     ) -> (f64, Climb) {
         let (mut low, mut found) = self.guessed_bound(grid, budget, known);
-        let mut within = |bound| self.climb(grid, bound, Some(budget), known);
+        let mut within = |bound: f64| self.climb(grid, &bound.into(), Some(budget), known);
         let was_guessed = found.is_some();
         if low == 0.0
             && !was_guessed
@@ -122,7 +122,7 @@ impl HeightSearch<'_> {
             if !(low..high / (1.0 + PRECISION)).contains(&bound) {
                 break;
             }
-            match self.climb(grid, bound, Some(budget), known) {
+            match self.climb(grid, &bound.into(), Some(budget), known) {
                 Some(climb) => found = Some((bound, climb)),
                 None => low = bound,
             }
@@ -138,7 +138,7 @@ impl HeightSearch<'_> {
         budget: Budget<'_>,
         known: &KnownLayers,
     ) -> f64 {
-        let within = |bound| self.guess(grid, table, bound, budget, known);
+        let within = |bound: f64| self.guess(grid, table, &bound.into(), budget, known);
         if within(0.0).is_some() {
             return 0.0;
         }

@@ -33,6 +33,17 @@ pub enum HeightsError {
         /// The part's height.
         height: Length,
     },
+    /// Bounds differ by height, and the part has heights without one.
+    #[error(
+        "no bound holds from {from} to {to}, where the part is: let the ranges cover it, such as by an \
+         open end"
+    )]
+    NoBound {
+        /// The lower end of these heights.
+        from: Length,
+        /// The upper end.
+        to: Length,
+    },
     /// More rows than any image has.
     #[error("rows {pitch} apart are more than 2^24")]
     TooManyRows {

@@ -3,8 +3,8 @@
 //! A layer is built as the part's section at its top, swept down. A
 //! [`LayeredPart`] compares such [`SweptLayer`]s with the part, for all tops that a
 //! layer may have at once. A [`Criterion`] measures a layer's error. A
-//! [`HeightSearch`] takes as few layers whose error is within a bound as it finds from the
-//! bottom up, or the most accurate ones within a budget (002 section 3.2), and places them
+//! [`HeightSearch`] takes as few layers whose error is within a bound, which may differ by height, as it
+//! finds from the bottom up, or the most accurate ones within a budget (002 section 3.2), and places them
 //! where they err least together. [`WantedHeights`] names the criterion and what decides the
 //! bound.
 //!
@@ -38,6 +38,7 @@
 //! ```
 
 mod budget;
+mod by_height;
 mod closed;
 mod criterion;
 mod error;
@@ -57,6 +58,7 @@ mod thicknesses;
 mod uniform;
 mod wanted;
 
+pub use by_height::{ByHeight, ByHeightError, HeightRange, Share};
 pub use criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
 pub use error::HeightsError;
 pub use layered_part::LayeredPart;

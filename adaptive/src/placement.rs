@@ -1,5 +1,6 @@
 //! Places as many layers as were found where they err least together.
 
+use crate::by_height::ByHeight;
 use crate::criterion::Criterion;
 use crate::known::KnownLayers;
 use crate::search::Heights;
@@ -21,7 +22,7 @@ pub(crate) struct LayerPlacement<'a> {
     pub(crate) thicknesses: &'a Thicknesses,
     pub(crate) criterion: &'a dyn Criterion,
     pub(crate) ends: &'a [usize],
-    pub(crate) bound: f64,
+    pub(crate) bounds: &'a ByHeight<f64>,
     /// Layers that are known better than from the table.
     pub(crate) known: &'a KnownLayers,
 }
@@ -103,7 +104,7 @@ impl LayerPlacement<'_> {
         let known = self.known.get(&step);
         let of = |(&steps, layer): (&usize, SweptLayer)| {
             let layer = known.and_then(|known| known_of(known, steps)).unwrap_or(layer);
-            let past = u32::from(self.criterion.measure(&layer) > self.bound);
+            let past = u32::from(self.criterion.measure(&layer) > self.bounds.of_layer(&layer));
             LayerChoice { steps, cost: (past, layer.lost_mm3 + layer.gained_mm3) }
         };
         let ends = |steps: &usize| may_end(step + steps);
@@ -130,9 +131,14 @@ fn known_of(known: &[(usize, SweptLayer)], steps: usize) -> Option<SweptLayer> {
     Some(known[place].1)
 }
 
-/// Returns how many layers are past a bound, and the volume lost and gained.
-pub(crate) fn cost_of(heights: &Heights, criterion: &dyn Criterion, bound: f64) -> PlacementCost {
-    let past = heights.layers.iter().filter(|layer| criterion.measure(layer) > bound).count();
+/// Returns how many layers are past their bounds, and the volume lost and gained.
+pub(crate) fn cost_of(
+    heights: &Heights,
+    criterion: &dyn Criterion,
+    bounds: &ByHeight<f64>,
+) -> PlacementCost {
+    let is_past = |layer: &&SweptLayer| criterion.measure(layer) > bounds.of_layer(layer);
+    let past = heights.layers.iter().filter(is_past).count();
     let [lost, gained, _] = heights.volumes_mm3();
     (past as u32, lost + gained)
 }

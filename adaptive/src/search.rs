@@ -5,6 +5,7 @@ use std::fmt;
 use lamp_slicing::{LayerHeights, SliceError};
 use lamp_stack::Length;
 
+use crate::by_height::ByHeight;
 use crate::criterion::Criterion;
 use crate::error::HeightsError;
 use crate::known::{KnownLayers, guessed, know};
@@ -154,10 +155,10 @@ pub(crate) struct Climb {
 const WORTHWHILE: f64 = 0.99;
 
 impl HeightSearch<'_> {
-    /// Finds the layers within a bound: as many as are found from the bottom up, where each is the
-    /// thickest whose measure is at most `bound`, or the thinnest if no measure is. Of all ways to
-    /// place as many, this is the one that loses and gains least. They end at the part's top,
-    /// rounded to whole steps.
+    /// Finds the layers within bounds: as many as are found from the bottom up, where each is the
+    /// thickest whose measure is at most its bound, or the thinnest if no measure is. A layer that
+    /// meets several bounds keeps the least of them. Of all ways to place as many, this is the one
+    /// that loses and gains least. They end at the part's top, rounded to whole steps.
     ///
     /// Source: 002 section 3.2.3, algorithms 12 and 13. These bisect; but thicker layers
     /// are not always worse, so here all thicknesses are tried that the criterion does
@@ -165,12 +166,16 @@ impl HeightSearch<'_> {
     ///
     /// # Errors
     /// Returns an error if there would be too many layers.
-    pub fn heights(&self, bound: f64) -> Result<Heights, HeightsError> {
+    pub fn heights(&self, bounds: impl Into<ByHeight<f64>>) -> Result<Heights, HeightsError> {
+        let bounds = bounds.into();
+        if let Some([from, to]) = bounds.missing(self.part.heights_um()) {
+            return Err(HeightsError::NoBound { from, to });
+        }
         let grid = self.grid()?;
         let mut known = KnownLayers::new();
-        let climb = self.climb(&grid, bound, None, &mut known);
+        let climb = self.climb(&grid, &bounds, None, &mut known);
         let climb = climb.expect("layers that cost nothing are within any budget");
-        Ok(self.placed(&grid, climb, &known, bound, None))
+        Ok(self.placed(&grid, climb, &known, &bounds, None))
     }
 
     /// Returns the steps where layers may end, and the table of the facets.
@@ -194,7 +199,7 @@ impl HeightSearch<'_> {
     pub(crate) fn climb(
         &self,
         grid: &StepGrid<'_>,
-        bound: f64,
+        bounds: &ByHeight<f64>,
         budget: Option<Budget<'_>>,
         known: &mut KnownLayers,
     ) -> Option<Climb> {
@@ -202,8 +207,8 @@ impl HeightSearch<'_> {
         let mut last_um = f64::INFINITY;
         while step < grid.end() {
             let choices = self.thicknesses.choices(step, &grid.ends);
-            let found = self.layers(grid, step, &choices, last_um, bound);
-            let chosen = self.choose(&found, bound, budget);
+            let found = self.layers(grid, step, &choices, last_um, bounds);
+            let chosen = self.choose(&found, bounds, budget);
             let layer = found[chosen];
             know(known, step, choices.iter().copied().zip(found).collect());
             step += choices[chosen];
@@ -224,7 +229,7 @@ impl HeightSearch<'_> {
         &self,
         grid: &StepGrid<'_>,
         table: &HeightTable,
-        bound: f64,
+        bounds: &ByHeight<f64>,
         budget: Budget<'_>,
         known: &KnownLayers,
     ) -> Option<Vec<SweptLayer>> {
@@ -232,7 +237,7 @@ impl HeightSearch<'_> {
         while step < grid.end() {
             let choices = self.thicknesses.choices(step, &grid.ends);
             let found = guessed(table, known, step, &choices);
-            let chosen = self.choose(&found, bound, Some(budget));
+            let chosen = self.choose(&found, bounds, Some(budget));
             step += choices[chosen];
             spent += budget.of(&found[chosen]);
             if spent > budget.max {
@@ -249,27 +254,27 @@ impl HeightSearch<'_> {
         grid: &StepGrid<'_>,
         climb: Climb,
         known: &KnownLayers,
-        bound: f64,
+        bounds: &ByHeight<f64>,
         budget: Option<Budget<'_>>,
     ) -> Heights {
         let Climb { heights: found, tops } = climb;
         let Some(table) = &grid.table else { return found };
         let (thicknesses, criterion, ends) = (self.thicknesses, self.criterion, &grid.ends[..]);
-        let placement = LayerPlacement { table, thicknesses, criterion, ends, bound, known };
-        let cost = cost_of(&found, criterion, bound);
+        let placement = LayerPlacement { table, thicknesses, criterion, ends, bounds, known };
+        let cost = cost_of(&found, criterion, bounds);
         let worthwhile = (cost.0, WORTHWHILE * (cost.1 - found.unbuilt_mm3));
         let Some(best) = placement.least_error(&tops, worthwhile) else { return found };
         let mut step = 0;
         let layers = best.iter().map(|&steps| {
             let layer = placement.known(step, steps);
-            let layer =
-                layer.unwrap_or_else(|| self.layers(grid, step, &[steps], f64::INFINITY, bound)[0]);
+            let layer = layer
+                .unwrap_or_else(|| self.layers(grid, step, &[steps], f64::INFINITY, bounds)[0]);
             step += steps;
             layer
         });
         let better = Heights { layers: layers.collect(), ..found };
         let is_within = budget.is_none_or(|budget| budget.of_all(&better.layers) <= budget.max);
-        if is_within && cost_of(&better, criterion, bound) < cost { better } else { found }
+        if is_within && cost_of(&better, criterion, bounds) < cost { better } else { found }
     }
 
     /// Returns the layers of all thicknesses, in steps, or of the lower ones if no other can be
@@ -280,7 +285,7 @@ impl HeightSearch<'_> {
         bottom: usize,
         choices: &[usize],
         last_um: f64,
-        bound: f64,
+        bounds: &ByHeight<f64>,
     ) -> Vec<SweptLayer> {
         if let (Some(table), Some(overlaps)) = (&grid.table, &grid.overlaps) {
             return overlaps.layers(table, bottom, choices);
@@ -293,6 +298,8 @@ impl HeightSearch<'_> {
         if near_um < NEAR * max_um {
             let near = tops_um.partition_point(|top| top - bottom_um <= near_um).max(1);
             let layers = self.part.layers(bottom_um, &tops_um[..near]);
+            // Thicker layers meet the same bounds, and maybe lesser ones.
+            let bound = layers.each.last().map_or(0.0, |last| bounds.of_layer(last));
             if self.criterion.rules_out_thicker(&layers, max_um, bound) {
                 return layers.each;
             }
@@ -303,11 +310,12 @@ impl HeightSearch<'_> {
     pub(crate) fn choose(
         &self,
         layers: &[SweptLayer],
-        bound: f64,
+        bounds: &ByHeight<f64>,
         budget: Option<Budget<'_>>,
     ) -> usize {
-        let measures: Vec<f64> = layers.iter().map(|layer| self.criterion.measure(layer)).collect();
-        let mut good = (0..layers.len()).rev().filter(|&k| measures[k] <= bound);
+        let is_good = |layer: &SweptLayer| self.criterion.measure(layer) <= bounds.of_layer(layer);
+        let is_good: Vec<bool> = layers.iter().map(is_good).collect();
+        let mut good = (0..layers.len()).rev().filter(|&k| is_good[k]);
         let cheapest = match budget {
             None => good.next(),
             Some(budget) => {

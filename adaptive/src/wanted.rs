@@ -4,6 +4,7 @@ use std::fmt;
 
 use lamp_stack::{Length, Pitch};
 
+use crate::by_height::ByHeight;
 use crate::criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
 use crate::error::HeightsError;
 use crate::layered_part::LayeredPart;
@@ -44,10 +45,10 @@ impl Measure {
 }
 
 /// The goal that decides how far layers may err.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub enum Goal<'a> {
-    /// Every layer is within this bound.
-    Bound(f64),
+    /// Every layer is within its bound.
+    Bounds(ByHeight<f64>),
     /// At most this many layers, with the smallest bound that allows it.
     Layers(u32),
     /// All layers together cost at most this much, with the smallest bound that allows it.
@@ -62,7 +63,7 @@ pub enum Goal<'a> {
 impl fmt::Debug for Goal<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Bound(bound) => write!(f, "Bound({bound})"),
+            Self::Bounds(bounds) => write!(f, "Bounds({bounds})"),
             Self::Layers(layers) => write!(f, "Layers({layers})"),
             Self::Cost { most, .. } => write!(f, "Cost({most})"),
         }
@@ -76,19 +77,19 @@ pub struct WantedHeights<'a> {
     pub thicknesses: Thicknesses,
     /// The measure of a layer's error.
     pub measure: Measure,
-    /// The goal that decides its bound.
+    /// The goal that decides its bounds.
     pub goal: Goal<'a>,
     /// Makes layers end at flat faces.
     pub snap: bool,
 }
 
-/// The layers found, and the bound that they keep.
+/// The layers found, and the bounds that they keep.
 #[derive(Clone, Debug)]
 pub struct FoundHeights {
     /// The measure of a layer's error.
     pub measure: Measure,
-    /// The largest error of a layer, unless no layer within the limits has one as small.
-    pub bound: f64,
+    /// The largest errors of layers, unless no layer within the limits has one as small.
+    pub bounds: ByHeight<f64>,
     /// The layers.
     pub heights: Heights,
 }
@@ -116,20 +117,24 @@ impl WantedHeights<'_> {
     pub fn find(&self, part: &LayeredPart, watch: Watch<'_>) -> Result<FoundHeights, HeightsError> {
         let (thicknesses, criterion) = (&self.thicknesses, self.measure.criterion());
         let search = HeightSearch { part, thicknesses, criterion, snap: self.snap, watch };
-        let (bound, heights) = match self.goal {
-            Goal::Bound(bound) => (bound, search.heights(bound)?),
+        let (bound, heights) = match &self.goal {
+            Goal::Bounds(bounds) => {
+                let (bounds, heights) = (bounds.clone(), search.heights(bounds.clone())?);
+                return Ok(FoundHeights { measure: self.measure, bounds, heights });
+            }
             // A layer costs one, so that the cost counts layers.
-            Goal::Layers(layers) => search.within_budget(|_| 1.0, layers.into())?,
-            Goal::Cost { of_layer, most } => search.within_budget(of_layer, most)?,
+            Goal::Layers(layers) => search.within_budget(|_| 1.0, (*layers).into())?,
+            Goal::Cost { of_layer, most } => search.within_budget(of_layer, *most)?,
         };
-        Ok(FoundHeights { measure: self.measure, bound, heights })
+        Ok(FoundHeights { measure: self.measure, bounds: bound.into(), heights })
     }
 }
 
 impl FoundHeights {
-    /// Returns how many layers exceed the bound.
+    /// Returns how many layers exceed their bounds.
     pub fn past(&self, heights: &Heights) -> usize {
-        let is_past = |layer: &&SweptLayer| self.measure.criterion().measure(layer) > self.bound;
+        let criterion = self.measure.criterion();
+        let is_past = |layer: &&SweptLayer| criterion.measure(layer) > self.bounds.of_layer(layer);
         heights.layers.iter().filter(is_past).count()
     }
 
@@ -174,7 +179,7 @@ mod tests {
                 WantedHeights { thicknesses: thicknesses.clone(), measure, goal, snap: false };
             wanted.find(&part, Watch::default())
         };
-        let bounded = find(Measure::Volume, Goal::Bound(0.05)).unwrap();
+        let bounded = find(Measure::Volume, Goal::Bounds(0.05.into())).unwrap();
         // Next to the tip even the thinnest layers exceed the bound.
         let layers = &bounded.heights.layers;
         let thinnest = layers.iter().filter(|layer| layer.thickness_um == 10.0).count();
@@ -182,7 +187,7 @@ mod tests {
         assert!(0 < past && past <= thinnest && thinnest < layers.len(), "{past} of {thinnest}");
         assert_eq!(bounded.doubt(), None);
         let few = find(Measure::Cusp, Goal::Layers(20)).unwrap();
-        assert!(few.heights.layers.len() <= 20 && few.bound > 0.0);
+        assert!(few.heights.layers.len() <= 20 && few.bounds.least_and_most()[0] > 0.0);
         let cost = Goal::Cost { of_layer: &|_| 30.0, most: 20.0 * 30.0 };
         assert_eq!(find(Measure::Cusp, cost).unwrap().heights, few.heights);
         let nine = find(Measure::Area, Goal::Layers(9));

@@ -1,8 +1,8 @@
 //! Checks the search for layer heights: bounds, degenerate parts, budgets, flat faces.
 
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart,
-    SweptLayer, Thicknesses, VolumeDeviation, Watch, uniform_heights,
+    AreaDeviation, ByHeight, Criterion, CuspHeight, HeightSearch, Heights, HeightsError,
+    LayeredPart, Share, SweptLayer, Thicknesses, VolumeDeviation, Watch, uniform_heights,
 };
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, tower};
 use lamp_slicing::{Axis, FacetIndex, Fill, Part, Placement, Units};
@@ -349,4 +349,49 @@ fn a_budget_takes_few_searches() {
         let _ = search.within_budget(|_| 1.0, layers).unwrap();
         assert!(searches.get() <= 4, "{} searches for {layers} layers", searches.get());
     }
+}
+
+/// A cone of 45 degrees has cusps of t / √2. Between 0 and 2 mm 47 layers of 42 um and one of 26 um
+/// keep 30 um; above, 95 layers of 21 um and one of 5 um keep 15 um.
+#[test]
+fn ranges_of_height_have_their_own_bounds() {
+    let part = part(&cone(5.0, 1.0, 4.0, 20_000));
+    let thicknesses = buildable(5.0, 100.0, 1.0);
+    let bounds: ByHeight<Length> = "30um@0mm..2mm,15um@2mm..".parse().unwrap();
+    let bounds = bounds.map(|bound| bound.um());
+    let search = HeightSearch { criterion: &CuspHeight, ..by_volume(&part, &thicknesses) };
+    let heights = search.heights(bounds.clone()).unwrap();
+    assert_eq!(heights.layers.len(), 48 + 96);
+    for layer in &heights.layers {
+        let bound = if layer.top_um() < 2000.001 { 30.0 } else { 15.0 };
+        assert!(layer.thickness_um * 0.5f64.sqrt() < bound + 0.01, "{layer:?}");
+        assert_eq!(bounds.of_layer(layer), bound);
+    }
+    // Either bound alone gives the layers of its range, and more or fewer in the other.
+    let count = |bound: f64| search.heights(bound).unwrap().layers.len();
+    assert_eq!([count(30.0), count(15.0)], [96, 191]);
+    let none: ByHeight<Length> = "30um@0mm..2mm".parse().unwrap();
+    let error = search.heights(none.map(|bound| bound.um())).unwrap_err().to_string();
+    assert!(error.starts_with("no bound holds from 2mm to 4mm, where the part is"), "{error}");
+}
+
+/// The volume criterion prunes with the bound of the range, not with that of another.
+#[test]
+fn ranges_of_height_rule_out_no_layer_that_is_within_its_bound() {
+    let lying = Placement::default().rotated(Axis::X, 33.0).rotated(Axis::Y, 21.0);
+    let mut open = cube_with_hole(8.0, 2.0, 400);
+    // Without a table of facets, layers are looked at from the thinnest up.
+    open.facets.pop();
+    let part = placed(&open, &lying);
+    let [bottom, top] = part.heights_um();
+    let middle = Length::from_um((bottom + top) / 2.0);
+    let bounds: ByHeight<Share> = format!("2%@..{middle},20%@{middle}..").parse().unwrap();
+    let bounds = bounds.map(|Share(share)| *share);
+    let thicknesses = buildable(20.0, 4_000.0, 10.0);
+    let search = by_volume(&part, &thicknesses);
+    let all = HeightSearch { criterion: &LookingAtAll, ..by_volume(&part, &thicknesses) };
+    let [found, expected] =
+        [search, all].map(|search| built_um(&search.heights(bounds.clone()).unwrap()));
+    assert_eq!(found, expected);
+    assert!(found[0] < 200.0 && found.iter().any(|um| *um > 500.0), "{found:?}");
 }

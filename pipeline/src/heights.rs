@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use lamp_adaptive::{
-    FoundHeights, Goal, HeightsDoubt, HeightsError, LayeredPart, Measure, SweptLayer, Thicknesses,
-    WantedHeights, Watch, row_pitch,
+    ByHeight, FoundHeights, Goal, HeightsDoubt, HeightsError, LayeredPart, Measure, Share,
+    SweptLayer, Thicknesses, WantedHeights, Watch, row_pitch,
 };
 use lamp_grayscale::exposure::Exposure;
 use lamp_slicing::{FacetIndex, Fill};
@@ -34,12 +34,12 @@ pub struct HeightSettings {
     /// Measure of a layer's error; `None` is volume, or cusps if `cusp` is given.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub criterion: Option<Measure>,
-    /// Largest error of a layer, as a share; `None` is 0.02.
+    /// Largest error of a layer, as a share, which may differ by height; `None` is 0.02.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
-    pub deviation: Option<f64>,
-    /// Largest height of cusps.
+    pub deviation: Option<ByHeight<Share>>,
+    /// Largest height of cusps, which may differ by height.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
-    pub cusp: Option<Length>,
+    pub cusp: Option<ByHeight<Length>>,
     /// Most layers, in place of a bound.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub layers_budget: Option<u32>,
@@ -66,9 +66,15 @@ pub fn measured(measure: Measure, number: f64) -> String {
     }
 }
 
-/// Returns the bound that heights keep in words: `volume 2.00%`.
+/// Returns the bound that heights keep in words: `volume 2.00%`, or `volume 0.500..2.00%` if bounds
+/// differ by height.
 pub fn bound(found: &FoundHeights) -> String {
-    format!("{} {}", found.measure, measured(found.measure, found.bound))
+    let [least, most] = found.bounds.least_and_most();
+    let [from, to] = [least, most].map(|bound| measured(found.measure, bound));
+    match least == most {
+        true => format!("{} {to}", found.measure),
+        false => format!("{} {}..{to}", found.measure, from.trim_end_matches(['%', 'u', 'm'])),
+    }
 }
 
 /// Returns sentences on rows that could not be measured, and on exposures at which the material was
@@ -169,13 +175,18 @@ impl HeightSettings {
         let goal = match (self.layers_budget, self.time_budget, &cost) {
             (Some(layers), ..) => Goal::Layers(layers),
             (_, Some(Seconds(most)), Some(cost)) => Goal::Cost { of_layer: cost, most },
-            _ => Goal::Bound(self.cusp.map_or(self.deviation.unwrap_or(0.02), Length::um)),
+            _ => Goal::Bounds(match (&self.cusp, &self.deviation) {
+                (Some(cusps), _) => cusps.map(|cusp| cusp.um()),
+                (None, Some(shares)) => shares.map(|Share(share)| *share),
+                (None, None) => 0.02.into(),
+            }),
         };
         let (thicknesses, measure, snap) = (self.thicknesses()?, self.measure()?, self.snap);
         let part_um = part.heights_um();
         let watch = |layer: &SweptLayer| watcher.height_reached(part_um, layer.top_um());
-        let found = WantedHeights { thicknesses, measure, goal, snap }.find(part, Watch(&watch));
-        let found = found.map_err(|error| over(error, goal))?;
+        let wanted = WantedHeights { thicknesses, measure, goal, snap };
+        let found = wanted.find(part, Watch(&watch));
+        let found = found.map_err(|error| over(error, &wanted.goal))?;
         if let Some(exposure) = exposure {
             // The search may choose a thickness that the material cannot cure or the table does not
             // list.
@@ -210,7 +221,7 @@ impl HeightSettings {
 }
 
 /// Describes a budget that is too small, in its unit.
-fn over(error: HeightsError, goal: Goal<'_>) -> Error {
+fn over(error: HeightsError, goal: &Goal<'_>) -> Error {
     let say = |amount| match goal {
         Goal::Layers(_) => format!("{amount} layers"),
         _ => time_text(amount),
@@ -244,18 +255,7 @@ pub fn time_text(seconds: f64) -> String {
 
 /// Parses a share: `2%` or `0.02`.
 pub fn parse_share(text: &str) -> Result<f64, String> {
-    let (number, factor) = match text.trim().strip_suffix('%') {
-        Some(number) => (number.trim_end(), 0.01),
-        None => (text.trim(), 1.0),
-    };
-    match number.parse::<f64>() {
-        // 2 is far more often meant to be 2% than 200%.
-        Ok(number) if factor == 1.0 && number >= 1.0 => {
-            Err(format!("`{text}` is not below 1: write {number}% or {}", number / 100.0))
-        }
-        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number * factor),
-        _ => Err(format!("`{text}` is not a share: write 2% or 0.02")),
-    }
+    text.parse().map(|Share(share)| share)
 }
 
 /// A time in seconds.
@@ -297,15 +297,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_and_times() {
-        assert_eq!(parse_share("2%"), Ok(0.02));
-        assert_eq!(parse_share("0.05"), Ok(0.05));
+    fn times_are_parsed() {
         assert_eq!("8h".parse(), Ok(Seconds(28_800.0)));
         assert_eq!("1.5 min".parse(), Ok(Seconds(90.0)));
-        assert_eq!(parse_share("150%"), Ok(1.5));
-        for wrong in ["", "-1%", "nan", "2 percent", "2", "inf%"] {
-            assert!(parse_share(wrong).is_err(), "{wrong}");
-        }
         for wrong in ["", "8", "h", "-3s", "nans", "infh"] {
             assert!(wrong.parse::<Seconds>().is_err(), "{wrong}");
         }

@@ -53,7 +53,7 @@ def slice(
     max: Optional[str] = None,
     step: Optional[str] = None,
     criterion: Optional[Literal["volume", "cusp", "area"]] = None,
-    deviation: Optional[float] = None,
+    deviation: Union[float, str, None] = None,
     cusp: Optional[str] = None,
     layers_budget: Optional[int] = None,
     time_budget: Optional[str] = None,
@@ -94,7 +94,8 @@ def slice(
         translate=(0, 0, 5) in millimeters.
     margin, or origin (in millimeters) and size: the pixels of the images.
     adaptive, min, max, step, criterion, deviation, cusp, layers_budget, time_budget,
-        layer_overhead, snap, row_pitch: layers as thick as the part's slopes allow.
+        layer_overhead, snap, row_pitch: layers as thick as the part's slopes allow. A bound may
+        differ by height: deviation="2%@0mm..12mm,0.5%@12mm..".
     material, overcure, lamp_intensity, or exposure_table: exposure times of the layers.
     gray, print_through: gray layers, which cure down to where the part ends.
     antialias: gray edges, whose levels are the shares of pixels within the part.

@@ -67,6 +67,8 @@ def test_keywords_are_the_options_of_the_program(tmp_path, stl, program):
         ({"origin": (-9, 9.5), "size": "20x20mm"}, ["--origin=-9,9.5", "--size", "20x20mm"]),
         ({"adaptive": True, "deviation": 0.05, "max": "300um", "snap": True},
          ["--adaptive", "--deviation", "0.05", "--max", "300um", "--snap"]),
+        ({"adaptive": True, "deviation": "5%@..2mm,1%@2mm.."},
+         ["--adaptive", "--deviation", "5%@..2mm,1%@2mm.."]),
         ({"material": "lamp-suspension", "overcure": 1.5, "gray": True},
          ["--material", "lamp-suspension", "--overcure", "1.5", "--gray"]),
         ({"machine": "beta", "layers": range(4, 9), "name": "a part"},

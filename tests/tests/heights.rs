@@ -78,6 +78,41 @@ fn a_stack_has_the_layers_of_the_report() {
 }
 
 #[test]
+fn ranges_of_height_have_their_own_bounds() {
+    let scratch = Scratch::new();
+    scratch.mesh("cone.stl", &cone(5.0, 1.0, 4.0, 2_000));
+    let bounds = "--cusp 30um@0..2mm,15um@2mm.. --min 5um";
+    scratch.run(&format!("slice cone.stl --dpi 200 --adaptive {bounds} -q -o cone.tif")).succeeds();
+    let said = scratch.run(&format!("lamp heights cone.stl {bounds} --csv heights.csv")).succeeds();
+    let said = String::from_utf8(said.stdout).unwrap();
+    assert!(said.contains("cusp 15.0..30.0um"), "{said}");
+    let layers = scratch.layers("cone.tif");
+    // Cusps of a slope of 45 degrees are t / sqrt(2): 42 um in the lower half, 21 um in the upper.
+    assert_eq!(layers.len(), 48 + 96);
+    for [z, thickness] in heights_of(&layers) {
+        let most = if z + thickness <= 2000.0 { 42.0 } else { 21.0 };
+        assert!(thickness <= most, "{z} {thickness}");
+    }
+    let rows = report(&scratch, "heights.csv");
+    assert!(rows.iter().map(|row| [row[1], row[2]]).eq(heights_of(&layers)));
+    // The recorded command leads to the same stack.
+    let command = &layers[0].info.stack.as_ref().unwrap().commands[0];
+    assert!(command.contains("--cusp 30um@0um..2mm,15um@2mm.."), "{command}");
+    assert!(scratch.run(command).succeeds().stdout == scratch.bytes("cone.tif"));
+    scratch
+        .run("lamp heights cone.stl --cusp 30um@0..2mm")
+        .is_refused_with(&["cone.stl: no bound holds from 2mm to 4mm, where the part is"]);
+    for (wrong, why) in [
+        ("2%@0..2mm,1%@1mm..", "0um..2mm and 1mm.. overlap"),
+        ("2%@0..2mm,1%@3mm..", "0um..2mm and 3mm.. leave a gap"),
+        ("2%@2", "`2` is not a range of height"),
+    ] {
+        let ran = scratch.run(&format!("lamp heights cone.stl --deviation {wrong}"));
+        assert!(ran.statuses == [Some(2)] && ran.stderr.contains(why), "{ran:?}");
+    }
+}
+
+#[test]
 fn every_stage_keeps_what_layers_say() {
     let scratch = with_tower();
     let slice = format!(

@@ -110,10 +110,14 @@ fn heights() {
     let line = "lamp heights tower.stl --min 1mm --max 2mm --step 0.5mm --exposure-table times.csv \
                 --layer-overhead 10s --uniform-thickness 2mm --csv heights.csv --json";
     let answer = answer(&scratch, line);
-    assert_eq!(keys(&answer), ["schema", "part", "criterion", "bound", "choices", "layers"]);
+    assert_eq!(
+        keys(&answer),
+        ["schema", "part", "criterion", "bound", "bounds", "choices", "layers"]
+    );
     assert_eq!(answer["schema"], "lamp-heights-1");
     assert_eq!((&answer["part"], &answer["criterion"]), (&json!("tower.stl"), &json!("volume")));
     assert_eq!(answer["bound"], 0.02);
+    assert_eq!(answer["bounds"], json!([{"from_um": null, "to_um": null, "bound": 0.02}]));
 
     // The layers are the rows of the report, to its digits.
     let layers = answer["layers"].as_array().unwrap();

@@ -1,8 +1,8 @@
 //! Options of adaptive layer heights.
 
 use clap::Args;
-use lamp_adaptive::Measure;
-use lamp_pipeline::heights::{HeightSettings, Seconds, parse_share};
+use lamp_adaptive::{ByHeight, Measure, Share};
+use lamp_pipeline::heights::{HeightSettings, Seconds};
 use lamp_stack::Length;
 
 use crate::args::options::{one_of, parse_thickness};
@@ -31,13 +31,18 @@ pub(crate) struct HeightArgs {
 
     /// Largest error of a layer, as a share of its volume, or of its section's area with
     /// --criterion area: 2% or 0.02 [default: 2%]
-    #[arg(long, value_name = "SHARE", value_parser = parse_share, help_heading = HEIGHTS)]
-    deviation: Option<f64>,
+    ///
+    /// 2%@0mm..12mm,0.5%@12mm.. gives each range of height its own bound, in coordinates of the
+    /// part. A layer in two ranges keeps the smaller bound
+    #[arg(long, value_name = "SHARE", help_heading = HEIGHTS)]
+    deviation: Option<ByHeight<Share>>,
 
     /// Largest cusp height: how far a layer's edge may be off the surface, along its normal
-    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
+    ///
+    /// 20um@0mm..12mm,5um@12mm.. gives each range of height its own bound
+    #[arg(long, value_name = "LENGTH", value_parser = parse_cusps, help_heading = HEIGHTS)]
     #[arg(conflicts_with = "deviation")]
-    cusp: Option<Length>,
+    cusp: Option<ByHeight<Length>>,
 
     /// Use at most N layers, with the smallest possible error (found to within one percent)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -71,8 +76,8 @@ impl From<&HeightArgs> for HeightSettings {
             max: args.max,
             step: args.step,
             criterion: args.criterion,
-            deviation: args.deviation,
-            cusp: args.cusp,
+            deviation: args.deviation.clone(),
+            cusp: args.cusp.clone(),
             layers_budget: args.layers_budget,
             time_budget: args.time_budget,
             layer_overhead: args.layer_overhead,
@@ -80,4 +85,9 @@ impl From<&HeightArgs> for HeightSettings {
             snap: args.snap,
         }
     }
+}
+
+/// Parses lengths above zero that may differ by height.
+fn parse_cusps(text: &str) -> Result<ByHeight<Length>, String> {
+    ByHeight::parse(text, parse_thickness).map_err(|error| error.to_string())
 }

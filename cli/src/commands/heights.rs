@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, FoundHeights, Heights, LayeredPart, Measure, SweptLayer,
-    uniform_heights,
+    AreaDeviation, Criterion, CuspHeight, FoundHeights, HeightRange, Heights, LayeredPart, Measure,
+    SweptLayer, uniform_heights,
 };
 use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
@@ -138,7 +138,8 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let answer = HeightsAnswer {
         part: name_of_all(&args.parts),
         criterion: found.measure.name(),
-        bound: found.bound,
+        bound: found.bounds.least_and_most()[0],
+        bounds: found.bounds.ranges().iter().map(BoundRange::new).collect(),
         choices,
         layers: layers.collect(),
     };
@@ -204,8 +205,10 @@ struct HeightsAnswer {
     part: String,
     /// The bounded measure: `volume`, `cusp` or `area`.
     criterion: &'static str,
-    /// Its bound: a share, or micrometers for `cusp`.
+    /// Its bound: a share, or micrometers for `cusp`; the smallest one if bounds differ by height.
     bound: f64,
+    /// The bounds by height, from below.
+    bounds: Vec<BoundRange>,
     /// The layers found, then uniform ones.
     choices: Vec<Choice>,
     /// The layers found, bottom first.
@@ -213,6 +216,25 @@ struct HeightsAnswer {
 }
 
 schemas! { "lamp-heights-1": HeightsAnswer; }
+
+/// A bound in a range of height.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct BoundRange {
+    /// Lower end of the range, in micrometers; null if it has none.
+    from_um: Option<f64>,
+    /// Upper end of the range, in micrometers; null if it has none.
+    to_um: Option<f64>,
+    /// The bound there, in the unit of `bound` above.
+    bound: f64,
+}
+
+impl BoundRange {
+    fn new(range: &HeightRange<f64>) -> Self {
+        let HeightRange { value: bound, from, to } = *range;
+        Self { from_um: from.map(Length::um), to_um: to.map(Length::um), bound }
+    }
+}
 
 /// A layer.
 // Under the names of the table's columns.
@@ -307,7 +329,7 @@ struct Choice {
     /// Measure of the worst layer, in the unit of `bound`; null if it has no bound.
     #[cfg_attr(test, schemars(with = "Option<f64>"))]
     worst: f64,
-    /// Number of layers whose measure is beyond `bound`.
+    /// Number of layers whose measure is beyond their bound.
     past_bound: usize,
     /// Time of all layers, in seconds, if exposures are given.
     // With what each layer takes besides its exposure.
