@@ -3,8 +3,8 @@
 
 use lamp_grayscale::material::{
     Constant, CurveLines, CurveNumbers, DimmedLines, Given, GivenDepths, GivenLine, GivenNumber,
-    GivenRange, KineticNumbers, Material, MeasuredRange, SpreadNumbers, TwoDepthNumbers,
-    WidthNumbers,
+    GivenRange, KineticNumbers, LawEnd, LawNumbers, LawVariable, Material, MeasuredRange,
+    SpreadNumbers, TwoDepthNumbers, WidthNumbers,
 };
 use lamp_grayscale::resin::{
     Absorptivity, Concentration, Diffusivity, Dose, Intensity, Quantity, RateConstant,
@@ -179,12 +179,21 @@ fn materials() -> impl Strategy<Value = Material> {
             constants,
         )| {
             let dimmed = gray.clone();
+            let end =
+                |at| LawEnd { at, depth: Some(curve.clone()), width: cure_width.first().cloned() };
+            let law = LawNumbers {
+                over: LawVariable::UvAbsorber,
+                held: Some(6.0),
+                least: end(0.0),
+                most: end(0.25),
+            };
             Material {
                 name,
                 description,
                 intensity,
                 spread,
                 gamma,
+                laws: vec![law],
                 working_curve: Some(curve),
                 gray,
                 gray_light,

@@ -239,7 +239,11 @@ impl EdgeMove {
             };
         };
         let material: Material = document(path)?;
-        let (material, lamp_doubt) = match args.lamp_intensity {
+        let lamp = args.lamp_intensity;
+        let width_doubt = lamp.map(|light| light.width_doubt(&material)).transpose();
+        let width_doubt =
+            width_doubt.map_err(|error| Error::new(ErrorKind::Work, error))?.flatten();
+        let (material, lamp_doubt) = match lamp {
             Some(light) => {
                 light.material(&material).map_err(|error| Error::new(ErrorKind::Work, error))?
             }
@@ -269,7 +273,8 @@ impl EdgeMove {
             )
         });
         let doses = MeasuredDoses::of_widths(&material);
-        let more_doubts = lamp_doubt.into_iter().chain(of_directions).collect();
+        // The critical dose of depths, which lamp_doubt is on, does not matter to widths.
+        let more_doubts = width_doubt.into_iter().chain(of_directions).collect();
         Ok(Self::CureWidth(Box::new(ByCureWidth { width, material, dose, doses, more_doubts })))
     }
 

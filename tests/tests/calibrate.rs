@@ -423,3 +423,132 @@ fn the_example_of_the_documentation_is_what_it_says() {
     let (line, printed) = block("text").split_once('\n').unwrap();
     assert_eq!(said(&scratch, line.strip_prefix("$ ").unwrap()), printed);
 }
+
+/// Films and squares of suspensions with the absorber of 002 table 8, by made-up laws: `1/D` and `E_c`
+/// at zero, and their rise for each g of absorber for 100 g of monomer.
+fn absorber() -> String {
+    let mut noise = SplitMix(84);
+    let mut csv = "uv_absorber_g_per_100g,photoinitiator_g_per_100g,dose_mj_per_cm2,depth_um,\
+                   feature_px,cured_um\n"
+        .to_owned();
+    for grams in [0.0, 0.0625, 0.125, 0.1875, 0.25_f64] {
+        let line = |zero: f64, rise: f64| zero + rise * grams;
+        let (penetration, critical) = (1.0 / line(0.0016, 0.016), line(40.0, 240.0));
+        for mj in [30.0, 150.0, 250.0, 400.0, 600.0, 900.0, 1400.0_f64] {
+            let depth = penetration * (mj / critical).ln();
+            let depth = if depth > 0.0 { depth + 4.0 * noise.normal() } else { 0.0 };
+            csv += &format!("{grams},6,{mj},{depth:.2},,\n");
+        }
+        let (slope, broad) = (1.0 / line(5.0, 30.0), line(80.0, 600.0));
+        for mj in (1..=10).map(|k| 60.0 * f64::from(k)) {
+            // 500 pixels of 1500 dpi, as in 002 section 3.4.5 and beyond.
+            let side = 8466.667 + 2.0 * (slope * (mj - broad).max(0.0) + 1.5 * noise.normal());
+            csv += &format!("{grams},6,{mj},,500,{side:.3}\n");
+        }
+    }
+    csv
+}
+
+#[test]
+fn laws_over_an_ingredient_make_materials_between() {
+    let scratch = Scratch::new();
+    scratch.write("absorber.csv", absorber().as_bytes());
+    let line = "lamp calibrate composition absorber.csv -o laws.toml --plot absorber.svg";
+    let table = said(&scratch, line);
+    assert!(table.starts_with("80 points of 85 rows (5 uncured"), "{table}");
+    answers(&scratch, line, &table);
+    for (name, truth) in [
+        ("1/Dp(c) at zero (1/um)", 0.0016),
+        ("1/Dp(c) rise (1/um)", 0.016),
+        ("Ec(c) at zero (mJ/cm2)", 40.0),
+        ("Ec(c) rise (mJ/cm2)", 240.0),
+        ("1/Dp^w(c) at zero ((mJ/cm2)/um)", 5.0),
+        ("1/Dp^w(c) rise ((mJ/cm2)/um)", 30.0),
+        ("Ec^w(c) at zero (mJ/cm2)", 80.0),
+        ("Ec^w(c) rise (mJ/cm2)", 600.0),
+    ] {
+        holds(estimate(&table, name, 0), truth);
+    }
+    // 002 eq. 61 at 0.125 g: D_p^d is 1/0.0036 um, E_c^d 70 and E_c^w 155 mJ/cm2.
+    holds(estimate(&table, "Bd (um)", 2), (155.0_f64 / 70.0).ln() / 0.0036);
+    assert!(text(&scratch, "absorber.svg").contains("Cure width: absorber.csv"));
+    let checked = said(&scratch, "lamp material check laws.toml");
+    assert!(
+        checked.contains("law over uv-absorber (0 to 0.25 g per 100 g of monomer)"),
+        "{checked}"
+    );
+    let made = "lamp material make laws.toml --uv-absorber 0.1 --name tenth -o tenth.toml";
+    let made = scratch.run(made).succeeds();
+    assert!(
+        made.stderr.contains("holds with 6 g per 100 g of monomer of photoinitiator"),
+        "{made:?}"
+    );
+    let file = text(&scratch, "tenth.toml");
+    let given = |after: &str| -> [f64; 2] {
+        let (_, rest) = file.split_once(after).unwrap_or_else(|| panic!("no {after} in {file}"));
+        ["value = \"", "plus-minus = \""].map(|key| {
+            let (_, number) = rest.split_once(key).unwrap();
+            number.split(' ').next().unwrap().parse().unwrap()
+        })
+    };
+    for (table, truth) in [
+        ("[working-curve.critical-dose]", 64.0),
+        ("[working-curve.penetration-depth]", 1.0 / 0.0032),
+        ("[cure-width.critical-dose]", 140.0),
+        ("[cure-width.sensitivity]", 1.0 / 8.0),
+    ] {
+        let [value, half] = given(table);
+        assert!((value - truth).abs() <= half && half < 0.2 * truth, "{table}: {value} {half}");
+    }
+    let outside = scratch.run("lamp material make laws.toml --uv-absorber 0.3");
+    outside.is_refused_with(&["laws.toml", "measured with 0 to 0.25 g", "not with 0.3"]);
+    let none = scratch.run("lamp material make laws.toml --photoinitiator 5");
+    none.is_refused_with(&["no [[law]] over photoinitiator"]);
+    let best = "lamp material make laws.toml --best bd --thickness 100um --overcure 3 -o best.toml";
+    let best = scratch.run(best).succeeds();
+    // B_d falls over the absorber (002 figure 89): without any it is ln(80/40)/0.0016, 433 um, and
+    // 300 um take 40 exp(0.48) mJ/cm2.
+    assert!(best.stderr.contains("0 g per 100 g of monomer of uv-absorber: 6"), "{best:?}");
+    assert!(best.stderr.contains("cures 300.0 um, and edges grow by 0 um"), "{best:?}");
+    scratch.run("lamp material make laws.toml --best bd").is_wrong_usage(&["--thickness"]);
+    // Both ingredients at once tell no law (002 section 3.4.8 d).
+    let both = absorber().replacen("0,6,150", "0,5,150", 1);
+    scratch.write("both.csv", both.as_bytes());
+    scratch.run("lamp calibrate composition both.csv").is_refused_with(&["both uv_absorber"]);
+}
+
+/// Squares under the lights of 002 section 3.4.5.
+#[test]
+fn cure_widths_follow_the_lamp() {
+    let scratch = Scratch::new();
+    let mut noise = SplitMix(80);
+    let mut csv = "lamp_mw_per_cm2,exposure_ms,feature_px,width_um\n".to_owned();
+    for mw in [480.0, 800.0, 1600.0_f64] {
+        let (slope, broad) = (1.0 / (3.0 + 0.002 * mw), 60.0 + 0.03 * mw);
+        for mj in (1..=10).map(|k| 50.0 * f64::from(k)) {
+            let width = slope * (mj - broad).max(0.0) + 0.5 * noise.normal();
+            csv += &format!("{mw},{:.4},500,{width:.3}\n", 1000.0 * mj / mw);
+        }
+    }
+    scratch.write("filters.csv", csv.as_bytes());
+    let line = "lamp calibrate lamp filters.csv --material lamp-suspension -o mine.toml";
+    let table = said(&scratch, line);
+    answers(&scratch, line, &table);
+    holds(estimate(&table, "1/Dp^w(I) at zero ((mJ/cm2)/um)", 0), 3.0);
+    holds(estimate(&table, "Ec^w(I) at zero (mJ/cm2)", 0), 60.0);
+    scratch.stack("part.tif", lamp_fixtures::cavity_staircase(1).layers());
+    let compensate = "lamp compensate part.tif --min-feature 0um --dose 200mJ/cm2";
+    let known = format!("{compensate} --material mine.toml --lamp-intensity 50% -o known.tif");
+    let known = scratch.run(&known).succeeds();
+    assert!(!known.stderr.contains("cure width"), "{known:?}");
+    let weak = format!("{compensate} --material mine.toml --lamp-intensity 20% -o weak.tif");
+    let weak = scratch.run(&weak).succeeds();
+    assert!(weak.stderr.contains("measured under 480 to 1600 mW/cm2"), "{weak:?}");
+    // Without the law, widths stay, and a line says so.
+    scratch.write("squares.csv", squares(&[(450.0, 100.0, 0.16)]).as_bytes());
+    let add = "lamp calibrate width squares.csv --material lamp-suspension -o stays.toml";
+    said(&scratch, add);
+    let stays = format!("{compensate} --material stays.toml --lamp-intensity 50% -o stays.tif");
+    let stays = scratch.run(&stays).succeeds();
+    assert!(stays.stderr.contains("cure widths stay, though real ones move"), "{stays:?}");
+}

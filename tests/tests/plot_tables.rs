@@ -87,6 +87,16 @@ fn every_plot_has_the_columns_and_axes_of_the_book() {
         }
     }
     scratch.write("filters.csv", filters.as_bytes());
+    let mut absorber =
+        "uv_absorber_g_per_100g,dose_mj_per_cm2,depth_um,feature_px,width_um\n".to_owned();
+    for grams in [0.0, 0.1, 0.2_f64] {
+        for dose in [200.0, 400.0, 800.0, 1600.0] {
+            let depth = (dose / (100.0 + 100.0 * grams)).ln() / (0.003 + 0.01 * grams);
+            let width = 0.1 * (dose - 300.0 - 300.0 * grams).max(0.0) + 0.001 * dose;
+            absorber += &format!("{grams},{dose},{depth:.2},,\n{grams},{dose},,500,{width:.3}\n");
+        }
+    }
+    scratch.write("absorber.csv", absorber.as_bytes());
     let job = "lamp plan speed stairs.tif --material pegda-sudan --search-gap 5% -o timed.tif";
     scratch.run(job).succeeds();
     scratch.run("lamp learn areas/ --start timed.tif --material pegda-sudan").succeeds();
@@ -100,6 +110,7 @@ fn every_plot_has_the_columns_and_axes_of_the_book() {
         ("lamp calibrate depth", "films.csv"),
         ("lamp calibrate width", "squares.csv"),
         ("lamp calibrate lamp", "filters.csv"),
+        ("lamp calibrate composition", "absorber.csv"),
         ("lamp heights", "tower.stl --min 1mm --max 2mm --step 0.5mm"),
         ("lamp plan speed", "stairs.tif --material pegda-sudan --search-gap 5% -o a.tif"),
         ("lamp plan voxels", "timed.tif --layers 22..42 --material pegda-sudan -o b.tif"),

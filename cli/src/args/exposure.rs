@@ -48,7 +48,7 @@ impl From<&ExposureArgs> for ExposureSettings {
 }
 
 /// Parses the depth that white cures, in layers.
-fn parse_overcure(text: &str) -> Result<f64, String> {
+pub(crate) fn parse_overcure(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(layers) if (0.1..=100.0).contains(&layers) => Ok(layers),
         _ => Err(format!(

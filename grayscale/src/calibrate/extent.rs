@@ -2,7 +2,7 @@
 
 use lamp_stack::Length;
 
-use super::measurements::DepthPoint;
+use super::measurements::{DepthPoint, LawPoint};
 use crate::material::{GivenRange, MeasuredRange};
 use crate::resin::Dose;
 
@@ -17,6 +17,13 @@ impl Extent {
     /// Returns the range of films; `None` if there are no films.
     pub(super) fn of_depths(points: &[DepthPoint]) -> Option<Self> {
         let depths = GivenRange::of(points.iter().map(|point| point.depth));
+        Some(Self { depths, ..Self::of_doses(points.iter().map(|point| point.dose))? })
+    }
+
+    /// Returns the range of films, or of squares, of several compositions.
+    pub(super) fn of_law(points: &[LawPoint], films: bool) -> Option<Self> {
+        let depths = GivenRange::of(points.iter().map(|point| point.measured));
+        let depths = depths.filter(|_| films);
         Some(Self { depths, ..Self::of_doses(points.iter().map(|point| point.dose))? })
     }
 

@@ -6,6 +6,7 @@ use thiserror::Error;
 use super::columns::{Column, DOSE, DoseColumn, EXPOSURE, LENGTHS, check_columns};
 use super::csv_table::{CsvTable, TableRow};
 use super::fit_scan::{LineKind, ScanDirection};
+use crate::material::LawVariable;
 use crate::resin::{Dose, GrayLevel, Intensity, cure_width_of_square};
 
 /// A measured cure depth.
@@ -44,6 +45,32 @@ pub struct WidthPoint {
     pub dose: Dose,
     /// The distance of the edges outside the image.
     pub width: Length,
+}
+
+/// A measured cure depth or cure width of a resin of some composition, or under some lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LawPoint {
+    /// The quantity over which the law is.
+    pub at: f64,
+    /// The dose.
+    pub dose: Dose,
+    /// The depth or the width.
+    pub measured: Length,
+}
+
+/// The films and squares of resins that differ in one quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LawTable {
+    /// The quantity.
+    pub over: LawVariable,
+    /// The other ingredient, in g for each 100 g of monomer, if the table has it.
+    pub held: Option<f64>,
+    /// Cure depths.
+    pub films: Vec<LawPoint>,
+    /// Cure widths.
+    pub squares: Vec<LawPoint>,
+    /// The side of all squares, if there are some.
+    pub feature_size: Option<Length>,
 }
 
 /// The measured width of a line or a gap.
@@ -116,6 +143,15 @@ pub enum DataError {
         /// The allowed values.
         wanted: &'static str,
     },
+    /// Two ingredients change from row to row.
+    #[error(
+        "both {0} and {1} change from row to row: keep one of them, and fit the other in a table of \
+         its own"
+    )]
+    BothChange(&'static str, &'static str),
+    /// No ingredient is in the table.
+    #[error("there is neither a column {0} nor {1}")]
+    NoIngredient(&'static str, &'static str),
     /// No row has a measurement.
     #[error("no row below the header holds a measurement")]
     NoRows,
@@ -130,6 +166,8 @@ const CURED: &str = "cured_um";
 const WIDTH: &str = "width_um";
 const DIRECTION: &str = "direction";
 const KIND: &str = "kind";
+const ABSORBER: &str = "uv_absorber_g_per_100g";
+const INITIATOR: &str = "photoinitiator_g_per_100g";
 
 /// Reads cure depths from a table of `dose_mj_per_cm2` or, under a light, `exposure_ms`;
 /// `depth_um`; and `gray`, white if that is absent. The doses are doses of full white. Rows of
@@ -228,6 +266,124 @@ pub fn width_points(
     })
 }
 
+/// Reads cure depths and cure widths from a table of `uv_absorber_g_per_100g` and
+/// `photoinitiator_g_per_100g`, of which one changes from row to row and the other may be missing;
+/// `dose_mj_per_cm2` or, under a light, `exposure_ms`; and for each row either `depth_um`, or
+/// `cured_um` or `width_um` with `feature_px` or `feature_um`, as [`depth_points`] and
+/// [`width_points`] read them. With `by_lamp`, `lamp_mw_per_cm2` takes the place of the ingredients,
+/// and is the light of exposure times.
+///
+/// # Errors
+/// Returns an error if a column is missing or unknown, if both ingredients change, if squares have
+/// several sizes, or if a cell is not a number in its range.
+pub fn law_points(
+    table: &CsvTable,
+    light: Option<Intensity>,
+    dpi: Dpi,
+    by_lamp: bool,
+) -> Result<(LawTable, Measured<()>), DataError> {
+    let columns: &'static [&'static str] = if by_lamp {
+        &[LAMP, SIZE_PIXELS, SIZE, DOSE, EXPOSURE, CURED, WIDTH]
+    } else {
+        &[ABSORBER, INITIATOR, SIZE_PIXELS, SIZE, DOSE, EXPOSURE, DEPTH, CURED, WIDTH]
+    };
+    check_columns(table, columns)?;
+    let (over, column, held) = law_columns(table, by_lamp)?;
+    let least = if over == LawVariable::UvAbsorber { 0.0 } else { 1e-6 };
+    let depth = Column::find(table, DEPTH);
+    let has_squares = [CURED, WIDTH].iter().any(|name| Column::find(table, name).is_some());
+    let squares = if has_squares {
+        Some((Column::either(table, SIZE_PIXELS, SIZE)?, Column::either(table, CURED, WIDTH)?))
+    } else {
+        None
+    };
+    if depth.is_none() && squares.is_none() {
+        return Err(DataError::NoColumn(if by_lamp { CURED } else { DEPTH }));
+    }
+    let (mut films, mut grown, mut feature_size) = (Vec::new(), Vec::new(), None);
+    let counts = measured(table, |row| {
+        let at = column.number(row)?;
+        if !(least..=1e9).contains(&at) {
+            return Err(column.impossible(
+                row,
+                match over {
+                    LawVariable::UvAbsorber => "zero or more grams",
+                    LawVariable::Photoinitiator => "more than zero grams",
+                    LawVariable::Lamp => "a light from 1e-6 to 1e9 mW/cm2",
+                },
+            ));
+        }
+        let light = if by_lamp { Some(Intensity::from_mw_per_cm2(at)) } else { light };
+        let dose = DoseColumn::find(table, light)?.of(row)?;
+        let film = depth.map_or(Ok(None), |depth| depth.length_or_blank(row))?;
+        let square = squares.map_or(Ok(None), |(_, (width, _))| width.length_or_blank(row))?;
+        let (measured, is_film) = match (film, square) {
+            (None, None) => return Ok(RowContent::Blank),
+            (Some(_), Some(_)) => {
+                let width = squares.map_or(column, |(_, (width, _))| width);
+                return Err(width.impossible(
+                    row,
+                    "empty, though the row has a depth: give films and squares a row each",
+                ));
+            }
+            (Some(depth), None) if depth.um() <= 0.0 => return Ok(RowContent::Nothing),
+            (Some(depth), None) => (depth, true),
+            (None, Some(width)) => (width, false),
+        };
+        if is_film {
+            films.push(LawPoint { at, dose, measured });
+            return Ok(RowContent::Point(()));
+        }
+        let ((size, in_pixels), (_, is_side)) = squares.expect("a square has columns");
+        let pitch = if in_pixels { dpi.pitch().um() } else { 1.0 };
+        let side = Length::from_um(size.number(row)? * pitch).to_whole_nm();
+        if !LENGTHS.contains(&side.um()) {
+            return Err(size.impossible(row, "a size from 0.001 um to 1 m"));
+        }
+        if *feature_size.get_or_insert(side) != side {
+            return Err(size.impossible(row, "the size of the squares above: a law is of one size"));
+        }
+        if is_side && measured.um() <= 0.0 {
+            return Ok(RowContent::Nothing);
+        }
+        let measured = if is_side { cure_width_of_square(measured, side) } else { measured };
+        grown.push(LawPoint { at, dose, measured });
+        Ok(RowContent::Point(()))
+    })?;
+    Ok((LawTable { over, held, films, squares: grown, feature_size }, counts))
+}
+
+/// Returns the quantity that changes from row to row, its column, and the other ingredient.
+fn law_columns(
+    table: &CsvTable,
+    by_lamp: bool,
+) -> Result<(LawVariable, Column, Option<f64>), DataError> {
+    if by_lamp {
+        let lamp = Column::find(table, LAMP).ok_or(DataError::NoColumn(LAMP))?;
+        return Ok((LawVariable::Lamp, lamp, None));
+    }
+    // The one number of a column, if all its rows have the same.
+    let only = |column: Column| -> Result<Option<f64>, DataError> {
+        let mut numbers = table.rows().iter().map(|row| column.number(row));
+        let Some(first) = numbers.next().transpose()? else { return Ok(None) };
+        let same = numbers.try_fold(true, |same, next| Ok(same && next? == first))?;
+        Ok(same.then_some(first))
+    };
+    let [absorber, initiator] = [ABSORBER, INITIATOR].map(|name| Column::find(table, name));
+    let (absorber, initiator) = match (absorber, initiator) {
+        (None, None) => return Err(DataError::NoIngredient(ABSORBER, INITIATOR)),
+        (Some(absorber), None) => return Ok((LawVariable::UvAbsorber, absorber, None)),
+        (None, Some(initiator)) => return Ok((LawVariable::Photoinitiator, initiator, None)),
+        (Some(absorber), Some(initiator)) => (absorber, initiator),
+    };
+    match (only(absorber)?, only(initiator)?) {
+        // 002 section 3.4.8 d: what follows from both together is not known.
+        (None, None) => Err(DataError::BothChange(ABSORBER, INITIATOR)),
+        (_, held @ Some(_)) => Ok((LawVariable::UvAbsorber, absorber, held)),
+        (held, None) => Ok((LawVariable::Photoinitiator, initiator, held)),
+    }
+}
+
 /// Reads the widths of lines and gaps from a table of `direction`, `across` or `along`; `kind`,
 /// `line` or `gap`; `feature_px` or `feature_um`, the width in the image; `dose_mj_per_cm2` or, under
 /// a light, `exposure_ms`; and `cured_um`, the width after curing. Lines of a width of zero or below
@@ -274,7 +430,7 @@ enum RowContent<T> {
 
 fn measured<T>(
     table: &CsvTable,
-    read: impl Fn(&TableRow) -> Result<RowContent<T>, DataError>,
+    mut read: impl FnMut(&TableRow) -> Result<RowContent<T>, DataError>,
 ) -> Result<Measured<T>, DataError> {
     let mut measured = Measured { points: Vec::new(), none: 0, blank: 0 };
     for row in table.rows() {
@@ -346,6 +502,49 @@ mod tests {
         let by_width = widths("feature_um,dose_mj_per_cm2,width_um\n423,200,13.3\n").unwrap();
         assert_eq!(by_width.points[0].feature_size.um(), 423.0);
         assert_eq!(by_width.points[0].width.um(), 13.3);
+    }
+
+    #[test]
+    fn films_and_squares_of_compositions() {
+        let read = |text: &str, by_lamp| {
+            let table = CsvTable::parse(text).unwrap();
+            law_points(&table, None, Dpi::new(1000.0).unwrap(), by_lamp)
+        };
+        let text = "uv_absorber_g_per_100g,photoinitiator_g_per_100g,dose_mj_per_cm2,depth_um,\
+                    feature_px,cured_um\n0,6,100,50,,\n0.1,6,100,-2,,\n0.1,6,200,,100,2560\n\
+                    0.1,6,200,,,\n";
+        let (law, counts) = read(text, false).unwrap();
+        assert_eq!((law.over, law.held), (LawVariable::UvAbsorber, Some(6.0)));
+        assert_eq!((counts.points.len(), counts.none, counts.blank), (2, 1, 1));
+        assert_eq!((law.films[0].at, law.films[0].measured.um()), (0.0, 50.0));
+        assert_eq!((law.squares[0].at, law.feature_size.unwrap().um()), (0.1, 2540.0));
+        assert!((law.squares[0].measured.um() - 10.0).abs() < 1e-9);
+        let other = read(&text.replace("0.1,6", "0,5"), false).unwrap().0;
+        assert_eq!((other.over, other.held), (LawVariable::Photoinitiator, Some(0.0)));
+        let lamp = "lamp_mw_per_cm2,exposure_ms,feature_um,width_um\n800,500,2540,12\n";
+        let lamp = read(lamp, true).unwrap().0;
+        assert_eq!((lamp.over, lamp.squares[0].at), (LawVariable::Lamp, 800.0));
+        assert_eq!(lamp.squares[0].dose.mj_per_cm2(), 400.0);
+        let refused = |text: &str| read(text, false).unwrap_err().to_string();
+        for (text, words) in [
+            (text.replacen("0,6,100", "0,5,100", 1), "both uv_absorber_g_per_100g and photo"),
+            (text.replace("50,,", "50,100,2560"), "each"),
+            (
+                text.to_owned() + "0.1,6,200,,101,2560\n",
+                "column feature_px: 101 is not the size of",
+            ),
+            (text.replace("0.1,6", "-1,6"), "-1 is not zero or more grams"),
+            (
+                text.replace("uv_absorber_g_per_100g", "note")
+                    .replace("photoinitiator_g_per_100g", "x"),
+                "`x` is not known",
+            ),
+            ("dose_mj_per_cm2,depth_um\n1,1\n".to_owned(), "neither a column uv_absorber"),
+            ("uv_absorber_g_per_100g,dose_mj_per_cm2\n0,1\n".to_owned(), "no column depth_um"),
+        ] {
+            let said = refused(&text);
+            assert!(said.contains(words), "{said} for {words}");
+        }
     }
 
     #[test]

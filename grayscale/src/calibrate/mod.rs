@@ -23,6 +23,7 @@ mod extent;
 mod fit_curve;
 mod fit_gray;
 mod fit_lamp;
+mod fit_law;
 mod fit_scan;
 mod fit_two_depth;
 mod fit_widths;
@@ -42,7 +43,7 @@ use std::fmt;
 use lamp_stack::{Length, format_significant, round_significant};
 use thiserror::Error;
 
-use crate::material::Given;
+use crate::material::{Given, LawVariable};
 use crate::resin::Quantity;
 
 pub use columns::NumberRow;
@@ -51,12 +52,13 @@ pub use exposure_times::ExposureTimes;
 pub use fit_curve::{CurveFit, fit_curve};
 pub use fit_gray::{GrayFit, LevelFit, LineEstimate, fit_gray};
 pub use fit_lamp::{LampFit, fit_lamp};
+pub use fit_law::{LawCurve, LawFit, LawLine, fit_law, law_numbers};
 pub use fit_scan::{LineKind, LinesOf, ScanDirection, ScanFit, fit_scan};
 pub use fit_two_depth::{TwoDepthFit, fit_two_depth};
 pub use fit_widths::{WidthFit, fit_widths};
 pub use measurements::{
-    DataError, DepthPoint, LampPoint, LinePoint, Measured, WidthPoint, depth_points, lamp_points,
-    line_points, width_points,
+    DataError, DepthPoint, LampPoint, LawPoint, LawTable, LinePoint, Measured, WidthPoint,
+    depth_points, lamp_points, law_points, line_points, width_points,
 };
 
 /// The cure models that can be fitted to depths.
@@ -207,6 +209,16 @@ pub enum FitError {
     /// There is only one light.
     #[error("{} too few: 2 are the least", are(*.0, "light"))]
     TooFewLights(usize),
+    /// There are too few values of an ingredient or the lamp for a law.
+    #[error("{} too few: {needed} are the least", values_of(*values, *over))]
+    TooFewValues {
+        /// The quantity.
+        over: LawVariable,
+        /// The number of values.
+        values: usize,
+        /// The least number.
+        needed: usize,
+    },
     /// A line over the gray level or the light falls by more than its interval.
     #[error(
         "{what} falls by {} +- {} {unit} towards more light, but the model takes no falling \
@@ -307,6 +319,14 @@ fn short(number: f64) -> String {
 /// Writes a count of something with its verb.
 fn are(count: usize, what: &str) -> String {
     if count == 1 { format!("1 {what} is") } else { format!("{count} {what}s are") }
+}
+
+fn values_of(count: usize, over: LawVariable) -> String {
+    if count == 1 {
+        format!("1 value of {over} is")
+    } else {
+        format!("{count} values of {over} are")
+    }
 }
 
 fn too_few_points(points: usize, needed: usize) -> String {

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use crate::material::{Material, MaterialError};
+use crate::material::{LawVariable, Material, MaterialError};
 use crate::resin::{Intensity, OpticalDensity, QuantityError};
 
 /// The light of full white now: a light, or a part of the material's own.
@@ -99,6 +99,34 @@ impl LampLight {
         Ok((under, doubt(material, lamp)))
     }
 
+    /// Returns a sentence on cure widths that are not known under this lamp, if there is one (002
+    /// section 3.4.5).
+    ///
+    /// # Errors
+    /// Returns an error if the material does not say the light that this is a part of.
+    pub fn width_doubt(self, material: &Material) -> Result<Option<String>, LampError> {
+        let lamp = self.of(material)?;
+        let name = &material.name;
+        if material.light().map_err(LampError::OwnLight)? == Some(lamp) {
+            return Ok(None);
+        }
+        let Some(law) = material.law(LawVariable::Lamp) else {
+            return Ok(Some(format!(
+                "{name} does not state how its cure width follows the lamp ([[law]] over lamp): cure \
+                 widths stay, though real ones move"
+            )));
+        };
+        Ok((!law.holds(lamp.mw_per_cm2())).then(|| {
+            format!(
+                "cure widths of {name} were measured under {} to {} mW/cm2, and the lamp gives {}: \
+                 they are extrapolated",
+                law.least.at,
+                law.most.at,
+                shown(lamp)
+            )
+        }))
+    }
+
     /// Returns the light of a wide field under this lamp.
     fn of(self, material: &Material) -> Result<Intensity, LampError> {
         let own = || {
@@ -126,15 +154,19 @@ fn doubt(material: &Material, lamp: Intensity) -> Option<String> {
     }
     let lights = material.dimmed_lamp.as_ref()?.lights?;
     (!material.knows_lamp(lamp)).then(|| {
-        let digits = format!("{:.4e}", lamp.mw_per_cm2());
-        let shown = digits.parse().map_or(lamp, Intensity::from_mw_per_cm2);
         format!(
-            "the lamp gives {shown}, but {name} was measured under {} to {}: its numbers are \
+            "the lamp gives {}, but {name} was measured under {} to {}: its numbers are \
              extrapolated",
+            shown(lamp),
             lights.from.mw_per_cm2(),
             lights.to
         )
     })
+}
+
+/// A light to five digits: shares of a light are seldom round.
+fn shown(lamp: Intensity) -> Intensity {
+    format!("{:.4e}", lamp.mw_per_cm2()).parse().map_or(lamp, Intensity::from_mw_per_cm2)
 }
 
 impl FromStr for LampLight {

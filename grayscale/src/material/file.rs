@@ -3,7 +3,7 @@
 use lamp_stack::{Builtin, CatalogueError, Catalogued, one_line};
 use thiserror::Error;
 
-use super::Material;
+use super::{LawVariable, Material};
 use crate::resin::ModelError;
 
 /// Why a material's numbers make no models.
@@ -34,6 +34,20 @@ pub enum MaterialError {
     /// A dimmed lamp's curve keeps the penetration depth of a working curve, which is missing.
     #[error("dimmed-lamp needs a working curve: add [working-curve.penetration-depth]")]
     NoWorkingCurve,
+    /// The numbers of a law are impossible.
+    #[error("law over {over}: {problem}")]
+    Law {
+        /// The quantity.
+        over: LawVariable,
+        /// The fault.
+        problem: &'static str,
+    },
+    /// Cure widths were measured under an unknown light.
+    #[error(
+        "cure widths follow the lamp, and no intensity says under which light they were measured: \
+         add [intensity]"
+    )]
+    NoLampOfWidths,
     /// Gray levels were measured under an unknown light.
     #[error(
         "the gray levels follow the lamp, and no intensity says under which light they were \
@@ -96,6 +110,7 @@ impl Catalogued for Material {
         self.gray_lines()?;
         self.two_depth()?;
         self.cure_width()?;
+        self.check_laws()?;
         self.kinetics()?;
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! A material under a lamp that has aged, or behind a filter.
 
-use super::{Given, Material, MaterialError};
+use super::{Given, LawVariable, Material, MaterialError};
 use crate::resin::{Intensity, Quantity};
 
 impl Material {
@@ -10,12 +10,13 @@ impl Material {
     /// penetration depth stays. For a gray level, which passes the share `G` of the light, the
     /// critical dose moves by `G` times as much, and the level keeps its penetration depth: it
     /// depends on the screen and not on the light (002 figure 65). 002 does not combine the two.
-    /// Two penetration depths stay as they are. So does a material that does not say how it follows
+    /// Cure widths of all sizes follow the law over the lamp in proportion (002 section 3.4.5, which
+    /// has one size). Two penetration depths stay as they are. So does a material that does not say how it follows
     /// the lamp; its doses then only take other times.
     ///
     /// # Errors
     /// Returns an error if the lines make no model under that light, or if gray levels follow the
-    /// lamp and no intensity says under which light they were measured.
+    /// lamp, or cure widths do, and no intensity says under which light they were measured.
     pub fn under_lamp(&self, lamp: Intensity) -> Result<Self, MaterialError> {
         let mut under = self.clone();
         let source = "the lamp's present light".to_owned();
@@ -32,9 +33,29 @@ impl Material {
             }
             under.move_gray(self, lamp)?;
         }
+        under.move_widths(self, lamp)?;
         under.gray_curve()?;
         under.gray_lines()?;
         Ok(under)
+    }
+
+    /// Moves cure widths from the lamp of another material to this light.
+    fn move_widths(&mut self, measured: &Self, lamp: Intensity) -> Result<(), MaterialError> {
+        let Some(law) = measured.law(LawVariable::Lamp) else { return Ok(()) };
+        let now = law.width_line(lamp.mw_per_cm2())?;
+        if self.cure_width.is_empty() {
+            self.cure_width.extend(law.at(lamp.mw_per_cm2()).width);
+            return Ok(());
+        }
+        let own = measured.light()?.ok_or(MaterialError::NoLampOfWidths)?;
+        let before = law.width_line(own.mw_per_cm2())?;
+        let dose = now.critical_dose.number() / before.critical_dose.number();
+        let slope = now.sensitivity.number() / before.sensitivity.number();
+        for width in &mut self.cure_width {
+            scale(&mut width.critical_dose, dose);
+            scale(&mut width.sensitivity, slope);
+        }
+        Ok(())
     }
 
     /// Moves the lines over the gray level from the lamp of another material to this light.
@@ -70,6 +91,12 @@ impl Material {
         let lights = self.dimmed_lamp.as_ref().and_then(|lines| lines.lights);
         lights.is_none_or(|lights| lights.holds(lamp))
     }
+}
+
+fn scale<T: Quantity>(given: &mut Given<T>, by: f64) {
+    let scaled = |number: T| T::of(number.number() * by);
+    given.value = scaled(given.value);
+    given.plus_minus = given.plus_minus.map(scaled);
 }
 
 #[cfg(test)]
@@ -142,6 +169,52 @@ mod tests {
         steep.dimmed_lamp.as_mut().unwrap().critical_dose.rise = Dose::from_mj_per_cm2(60.0);
         let error = steep.under_lamp(watts(0.5)).unwrap_err().to_string();
         assert!(error.starts_with("gray.critical-dose.rise must be zero or more"), "{error}");
+    }
+
+    #[test]
+    fn cure_widths_follow_the_law_over_the_lamp() {
+        let end = |name: &str, light: f64, slope: f64, critical: f64| {
+            format!(
+                "[law.{name}]\nat = {light}\n[law.{name}.width]\nfeature-size = \"8 mm\"\n\
+                 sensitivity = {{ value = \"{slope} um/(mJ/cm2)\", source = \"a\" }}\n\
+                 critical-dose = {{ value = \"{critical} mJ/cm2\", source = \"a\" }}\n"
+            )
+        };
+        // 002 figure 81: as the light falls, D^w rises and E^w falls.
+        let ends = end("least", 400.0, 0.25, 60.0) + &end("most", 1600.0, 0.125, 100.0);
+        let sizes = [(400.0, 0.1, 150.0), (8000.0, 0.125, 100.0)].map(|(um, slope, critical)| {
+            format!(
+                "[[cure-width]]\nfeature-size = \"{um} um\"\n\
+                 sensitivity = {{ value = \"{slope} um/(mJ/cm2)\", source = \"a\" }}\n\
+                 critical-dose = {{ value = \"{critical} mJ/cm2\", source = \"a\" }}\n"
+            )
+        });
+        let light = "[intensity]\nvalue = \"1.6 W/cm2\"\nsource = \"a\"\n";
+        let head = "name = \"mine\"\ndescription = \"\"\n";
+        let read = |text: &str| {
+            Material::from_toml(&format!("{head}{text}[[law]]\nover = \"lamp\"\n{ends}")).unwrap()
+        };
+        let lines = |material: Material, w: f64| {
+            material.under_lamp(watts(w)).unwrap().cure_width().unwrap().unwrap().lines().to_vec()
+        };
+        // Half of the way: 1/D^w is 6, and E^w 80.
+        let whole = read(&format!("{light}{}", sizes.concat()));
+        let half = lines(whole.clone(), 1.0);
+        near(half[1].sensitivity.um_per_mj_per_cm2(), 0.166667);
+        near(half[0].sensitivity.um_per_mj_per_cm2(), 0.1 * 0.166667 / 0.125);
+        near(half[0].critical_dose.mj_per_cm2(), 150.0 * 0.8);
+        let same = lines(whole, 1.6);
+        near(same[0].sensitivity.um_per_mj_per_cm2(), 0.1);
+        // Without sizes of its own, a material has the law's.
+        let [only] = lines(read(""), 0.4)[..] else { panic!("one size") };
+        near(only.critical_dose.mj_per_cm2(), 60.0);
+        let dark = read(&sizes.concat()).under_lamp(watts(1.0)).unwrap_err();
+        assert_eq!(dark, MaterialError::NoLampOfWidths);
+        // Where D^w would rise without end, there is no law.
+        let rises = end("least", 400.0, 0.125, 60.0) + &end("most", 1600.0, 0.25, 100.0);
+        let rises = Material::from_toml(&format!("{head}[[law]]\nover = \"lamp\"\n{rises}"));
+        let bright = rises.unwrap().under_lamp(watts(3.0)).unwrap_err().to_string();
+        assert!(bright.contains("must be above zero there"), "{bright}");
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod composition;
 mod file;
 mod kinetics;
 mod lamp;
+mod law;
 mod measured;
 mod number;
 mod peaks;
@@ -30,6 +31,7 @@ use thiserror::Error;
 pub use composition::{Composition, CompositionError};
 pub use file::MaterialError;
 pub use kinetics::KineticNumbers;
+pub use law::{BestBond, LawEnd, LawError, LawNumbers, LawVariable};
 pub use measured::{GivenRange, MeasuredRange};
 pub use number::{Constant, Given, GivenDepths, GivenLine, GivenNumber};
 
@@ -69,6 +71,10 @@ pub struct Material {
     /// The cure width of features of several sizes (002 section 3.4.4).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cure_width: Vec<WidthNumbers>,
+    /// How its numbers follow its composition (002 sections 3.4.6 and 3.4.7), and its cure width the
+    /// lamp (section 3.4.5).
+    #[serde(default, rename = "law", skip_serializing_if = "Vec::is_empty")]
+    pub laws: Vec<LawNumbers>,
     /// The rates of its reaction (003 section 4.1).
     pub kinetics: Option<KineticNumbers>,
     /// Other numbers of its source.

@@ -73,7 +73,7 @@ pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), Exit> {
     let title = format!("Cure depth: {}", files.source_name());
     let source = files.source(points.len());
     let plot = plot(title, &fit, points);
-    files.finish(base, |material| fit.add_to(material, &source), &plot, &fitted, common)
+    files.finish(base, |material| fit.add_to(material, &source), &[plot], &fitted, common)
 }
 
 /// Reports parameters that differ from what was measured.

@@ -21,7 +21,7 @@ pub(super) struct EstimateTable {
 struct CalibrateAnswer {
     /// Name of the measurements, as given.
     input: String,
-    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp` or `scan`.
+    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp`, `scan` or `composition`.
     model: &'static str,
     /// Rows that were used.
     points: usize,
@@ -30,11 +30,12 @@ struct CalibrateAnswer {
     without_measure: usize,
     /// Rows without a measurement.
     blank: usize,
-    /// Share of the scatter that the model explains, of all points; null with models of single sizes.
+    /// Share of the scatter that the model explains, of all points; null with models of single sizes,
+    /// and with laws, whose parameters have it for depths and widths.
     r2: Option<f64>,
     /// The parameters of the model.
     parameters: Vec<Parameter>,
-    /// Points of one gray level, one light or one size, with numbers of their own.
+    /// Points of one gray level, light, size or composition, with numbers of their own.
     groups: Vec<Group>,
 }
 
@@ -44,7 +45,8 @@ struct CalibrateAnswer {
 struct Parameter {
     /// Its name, as the table has it, such as `Ec`.
     name: String,
-    /// Its unit, such as `mJ/cm2`. A rise is from black to white, or for each W/cm2 of a lamp.
+    /// Its unit, such as `mJ/cm2`. A rise is from black to white, for each W/cm2 of a lamp, or, in a
+    /// law, for each unit of its quantity.
     unit: &'static str,
     /// The most likely value.
     value: f64,
@@ -58,7 +60,8 @@ struct Parameter {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Group {
-    /// The common quantity, with its unit: `gray`, `lamp_mw_per_cm2` or `feature_um`.
+    /// The common quantity, with its unit: `gray`, `lamp_mw_per_cm2`, `feature_um`,
+    /// `uv_absorber_g_per_100g` or `photoinitiator_g_per_100g`.
     of: &'static str,
     /// Its value.
     at: f64,
@@ -121,6 +124,19 @@ impl EstimateTable {
         self.answer.parameters.push(Parameter::new(name, estimate));
     }
 
+    /// Adds a number of a unit with the ends of its interval.
+    pub(super) fn numbers(&mut self, name: &str, unit: &'static str, number: [f64; 3]) {
+        let [value, low, high] = in_words(number);
+        self.line(&format!("{name} ({unit})"), &[&value, &low, &high]);
+        self.answer.parameters.push(Parameter::of(name, unit, number));
+    }
+
+    /// Adds how much of the scatter of some points the model explains.
+    pub(super) fn share(&mut self, name: &str, r2: f64) {
+        self.line(name, &[&short(r2)]);
+        self.answer.parameters.push(Parameter::of(name, "1", [r2, f64::NAN, f64::NAN]));
+    }
+
     /// Adds how much of the scatter of all points the model explains.
     pub(super) fn r2(&mut self, name: &str, r2: f64) {
         self.line(name, &[&short(r2)]);
@@ -167,16 +183,22 @@ impl EstimateTable {
 
 impl Parameter {
     fn new<T: Quantity>(name: &str, estimate: &Estimate<T>) -> Self {
-        let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(T::number);
+        Self::of(name, T::UNIT, [estimate.value, estimate.low, estimate.high].map(T::number))
+    }
+
+    fn of(name: &str, unit: &'static str, [value, low, high]: [f64; 3]) -> Self {
         let [low, high] = [low, high].map(|end| Some(end).filter(|end| end.is_finite()));
-        Self { name: name.to_owned(), unit: T::UNIT, value, low, high }
+        Self { name: name.to_owned(), unit, value, low, high }
     }
 }
 
 /// A value and its interval, in words: with the decimals that five digits of the
 /// value have, unless that makes them too long or nothing.
 pub(super) fn numbers<T: Quantity>(estimate: &Estimate<T>) -> [String; 3] {
-    let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(T::number);
+    in_words([estimate.value, estimate.low, estimate.high].map(T::number))
+}
+
+fn in_words([value, low, high]: [f64; 3]) -> [String; 3] {
     let shown = short(value);
     let decimals = shown.split_once('.').map_or(0, |(_, decimals)| decimals.len());
     [value, low, high].map(|number| {

@@ -4,10 +4,11 @@ use clap::Args;
 use lamp_grayscale::calibrate::{LampFit, LampPoint, fit_lamp, lamp_points};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Dose, Intensity};
+use lamp_stack::Dpi;
 
-use super::CalibrationFiles;
 use super::depth::{levelled, write_line};
 use super::estimate_table::{EstimateTable, in_legend, short};
+use super::{CalibrationFiles, composition};
 use crate::args::options::Common;
 use crate::exit::Exit;
 use crate::terminal::progress::Progress;
@@ -17,8 +18,9 @@ use lamp_plots::{Plot, PlotAxis, Series, highest};
 ///
 /// The CSV file has a header with the columns lamp_mw_per_cm2 (the light of full white under which
 /// the film was cured), dose_mj_per_cm2 (or exposure_ms, the time under that light) and depth_um.
-/// Filters in front of the lamp give several lights. Other commands use the result with
-/// --lamp-intensity.
+/// Filters in front of the lamp give several lights. Squares of one size, with feature_px (or
+/// feature_um) and cured_um (or width_um) in place of depth_um, give how the cure width follows the
+/// lamp. Other commands use the results with --lamp-intensity.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -27,6 +29,10 @@ Examples:
 pub(super) struct LampArgs {
     #[command(flatten)]
     files: CalibrationFiles,
+
+    /// Resolution of feature_px, in dots per inch
+    #[arg(long, default_value = "1500")]
+    dpi: Dpi,
 }
 
 pub(super) fn run(args: &LampArgs, common: &Common) -> Result<(), Exit> {
@@ -34,6 +40,10 @@ pub(super) fn run(args: &LampArgs, common: &Common) -> Result<(), Exit> {
     files.check()?;
     let base = files.base()?;
     let table = files.table()?;
+    let has = |name: &str| table.columns().iter().any(|column| column == name);
+    if !has("depth_um") && (has("cured_um") || has("width_um")) {
+        return composition::fit(files, base, &table, args.dpi, "lamp", common);
+    }
     let at_place = |error: Exit| error.at(files.place());
     let measured = lamp_points(&table).map_err(|error| at_place(error.into()))?;
     let points = &measured.points[..];
@@ -61,7 +71,7 @@ pub(super) fn run(args: &LampArgs, common: &Common) -> Result<(), Exit> {
         }
     };
     let title = format!("Cure depth by lamp: {}", files.source_name());
-    files.finish(base, add, &plot(title, &fit, points), &fitted, common)
+    files.finish(base, add, &[plot(title, &fit, points)], &fitted, common)
 }
 
 fn plot(title: String, fit: &LampFit, points: &[LampPoint]) -> Plot {

@@ -1,5 +1,6 @@
 //! `lamp calibrate`: the files and options that both kinds of calibration share.
 
+mod composition;
 mod depth;
 mod estimate_table;
 mod lamp;
@@ -8,7 +9,6 @@ mod width;
 
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
-use std::slice;
 
 use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
@@ -48,6 +48,7 @@ enum Calibration {
     Width(width::WidthArgs),
     Lamp(lamp::LampArgs),
     Scan(scan::ScanArgs),
+    Composition(composition::CompositionArgs),
 }
 
 pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
@@ -56,6 +57,7 @@ pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
         Calibration::Width(args) => width::run(args, common),
         Calibration::Lamp(args) => lamp::run(args, common),
         Calibration::Scan(args) => scan::run(args, common),
+        Calibration::Composition(args) => composition::run(args, common),
     }
 }
 
@@ -170,12 +172,12 @@ impl CalibrationFiles {
         &self,
         base: Option<Material>,
         add: impl FnOnce(&mut Material),
-        plot: &Plot,
+        plots: &[Plot],
         fitted: &EstimateTable,
         common: &Common,
     ) -> Result<(), Exit> {
         let progress = Progress::new("calibrate", common, true);
-        let draw = |path| drawn(slice::from_ref(plot), path).map(|bytes| (path, bytes));
+        let draw = |path| drawn(plots, path).map(|bytes| (path, bytes));
         let plot = self.plot.as_deref().map(draw).transpose()?;
         let material = self.output.as_deref().map(|output| -> Result<_, Exit> {
             let mut material = base.unwrap_or_else(|| self.new_material(output));

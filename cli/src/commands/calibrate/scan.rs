@@ -62,7 +62,7 @@ pub(super) fn run(args: &ScanArgs, common: &Common) -> Result<(), Exit> {
         }
         material.spread = Some(fit.numbers(&files.source(fit.points)));
     };
-    files.finish(base, add, &plot, &fitted, common)
+    files.finish(base, add, &[plot], &fitted, common)
 }
 
 /// Growth of lines and gaps over their width.

@@ -82,7 +82,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
             add_to(material, fit, &files.source(fit.points));
         }
     };
-    files.finish(base, add, &plot, &fitted, common)
+    files.finish(base, add, &[plot], &fitted, common)
 }
 
 /// How deep full white cures a material, where that is known.

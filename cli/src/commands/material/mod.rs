@@ -208,14 +208,17 @@ fn models_and_widths(material: &Material) -> String {
     models.chain(widths(material)).chain(light_laws(material)).collect::<Vec<_>>().join(", ")
 }
 
-/// How light spreads and how it follows gray levels.
-fn light_laws(material: &Material) -> impl Iterator<Item = String> {
+/// How light spreads and how it follows gray levels, and the laws over compositions and the lamp.
+fn light_laws(material: &Material) -> impl Iterator<Item = String> + '_ {
     let spread = spread_of(material).map(|spread| match spread.sigma() {
         Some(sigma) => format!("spread {sigma}"),
         None => format!("spread {} across and {} along the scan", spread.across(), spread.along()),
     });
     let gamma = material.gamma.as_ref().map(|gamma| format!("gamma {}", gamma.value));
-    spread.into_iter().chain(gamma)
+    let laws = material.laws.iter().map(|law| {
+        format!("law over {} ({} to {} {})", law.over, law.least.at, law.most.at, law.over.unit())
+    });
+    spread.into_iter().chain(gamma).chain(laws)
 }
 
 /// How light spreads. Built-in and checked materials have no faults.
