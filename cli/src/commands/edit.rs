@@ -14,9 +14,9 @@ use crate::terminal::stack_notes::noting;
 
 /// Edit the images of a part, without slicing it again
 ///
-/// It adds or subtracts boxes, cylinders, cones, spheres, lines, polygons, labels, pictures and
-/// other stacks in a range of heights, and can repeat them along lines and circles. It crops, pads,
-/// mirrors and rotates all layers. Lengths and positions are in part coordinates, even in a build,
+/// It adds or subtracts boxes, cylinders, cones, spheres, lofts, film-cooling holes, lines, polygons,
+/// labels, pictures and other stacks in a range of heights, and can repeat them along lines and
+/// circles. It crops, pads, mirrors and rotates all layers. Lengths and positions are in part coordinates, even in a build,
 /// where you can choose copies. Serial numbers of labels may come from a CSV file. A TOML file
 /// lists the edits, which are applied in order; docs/edit.md describes every key. Pages that no
 /// edit changes are copied with their compressed images and checks, and are not decoded.

@@ -4,6 +4,8 @@ use lamp_build::ImageBounds;
 use lamp_stack::{OrientationError, Pitch, StackError};
 use thiserror::Error;
 
+use super::film_hole::FilmHoleProblem;
+use super::loft::LoftProblem;
 use super::serials::ListProblem;
 
 /// Why a stack cannot be edited.
@@ -67,8 +69,8 @@ pub enum EditError {
 pub enum EditProblem {
     /// It has none or several of the keys that say what to do.
     #[error(
-        "write one of box, cylinder, line, polygon, strut, cone, sphere, label, picture, stack, crop, \
-         pad, mirror and rotate"
+        "write one of box, cylinder, line, polygon, strut, cone, sphere, loft, film_hole, label, \
+         picture, stack, crop, pad, mirror and rotate"
     )]
     NotOneAction,
     /// An edit of whole images chooses layers or an operation.
@@ -88,8 +90,8 @@ pub enum EditProblem {
     ManyRepeats,
     /// A pattern moves or tilts a shape that has no height of its own.
     #[error(
-        "only struts, cones, spheres and lying cylinders step up and turn about other axes than z: \
-         z or layers are for all repeats"
+        "only struts, cones, spheres, lofts, film holes and lying cylinders step up and turn about \
+         other axes than z: z or layers are for all repeats"
     )]
     RepeatUp,
     /// A pattern turns a picture by other angles than quarters.
@@ -112,6 +114,12 @@ pub enum EditProblem {
     /// The line, strut or cone has no length.
     #[error("it ends where it begins")]
     NoLength,
+    /// A loft is no solid.
+    #[error(transparent)]
+    Loft(#[from] LoftProblem),
+    /// A film-cooling hole is no hole.
+    #[error(transparent)]
+    FilmHole(#[from] FilmHoleProblem),
     /// The shape has more runs than an image can hold.
     #[error("it has more runs than an image can hold")]
     TooManyRuns,
@@ -229,7 +237,7 @@ pub enum EditProblem {
 pub enum LayerProblem {
     /// A solid meets a layer of unknown height.
     #[error(
-        "it does not state its height, so no strut, cone, sphere or lying cylinder can cross it"
+        "it does not state its height, so no strut, cone, sphere, loft or lying cylinder can cross it"
     )]
     NoHeightForSolid,
     /// Layers are chosen by height, but this one does not say its own.

@@ -11,9 +11,13 @@ mod edit_error;
 #[cfg(test)]
 mod edit_tests;
 mod fill;
+mod film_hole;
 mod frames;
 mod letters;
 mod list;
+mod loft;
+#[cfg(test)]
+mod loft_tests;
 mod other_stacks;
 mod page_changes;
 mod pattern;
@@ -32,7 +36,9 @@ use std::sync::Arc;
 use lamp_stack::{Layer, MemorySize, PageInfo, PassingLayer, map_in_order};
 
 pub use edit_error::{EditError, EditProblem, LayerProblem};
+pub use film_hole::FilmHoleProblem;
 pub use list::Edits;
+pub use loft::LoftProblem;
 pub use other_stacks::OtherLayers;
 pub use pictures::OtherPicture;
 pub use serials::{LabelList, ListProblem};

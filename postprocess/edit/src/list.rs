@@ -58,8 +58,11 @@ impl Edits {
         // No key takes a date, so the schema has refused dates by now.
         let told =
             told.iter().map(|edit| serde_json::to_value(edit).expect("TOML is JSON, dates apart"));
-        let edits = Self { told: told.collect(), list: file.edit, serials: Vec::new() };
-        (1..).zip(&edits.list).try_for_each(|(number, edit)| edit.check(number))?;
+        let mut edits = Self { told: told.collect(), list: file.edit, serials: Vec::new() };
+        for (number, edit) in (1..).zip(&mut edits.list) {
+            edit.check(number)?;
+            edit.make_loft().map_err(|problem| problem.of_edit(number))?;
+        }
         Ok(edits)
     }
 
@@ -152,6 +155,8 @@ impl Edit {
             self.strut.is_some(),
             self.cone.is_some(),
             self.sphere.is_some(),
+            self.loft.is_some(),
+            self.film_hole.is_some(),
             self.label.is_some(),
             self.picture.is_some(),
         ];
@@ -198,9 +203,24 @@ impl Edit {
 }
 
 impl Edit {
+    /// Makes a film-cooling hole the loft that it is, in a row.
+    fn make_loft(&mut self) -> Result<(), EditProblem> {
+        let Some(hole) = self.film_hole.take() else { return Ok(()) };
+        let (loft, row) = hole.loft()?;
+        // Other patterns repeat the whole row.
+        self.repeat.splice(..0, row);
+        self.loft = Some(loft);
+        self.pattern_problem().map_or(Ok(()), Err)
+    }
+
     fn pattern_problem(&self) -> Option<EditProblem> {
         let lies = self.cylinder.is_some_and(|cylinder| cylinder.along != CylinderAxis::Z);
-        let is_solid = lies || self.strut.is_some() || self.cone.is_some() || self.sphere.is_some();
+        let is_solid = lies
+            || self.strut.is_some()
+            || self.cone.is_some()
+            || self.sphere.is_some()
+            || self.loft.is_some()
+            || self.film_hole.is_some();
         // Each count is limited, but their product may overflow.
         let count = self.repeat.iter().map(Repeat::count).try_fold(1u64, u64::checked_mul);
         if count.is_none_or(|count| count > MAX_REPEATS) {

@@ -114,6 +114,12 @@ impl TryFrom<RepeatTable> for Repeat {
 }
 
 impl Repeat {
+    /// Returns a pattern along a line, or `None` if it has no shape or too many.
+    pub(super) fn line(count: u32, step: [Length; 3]) -> Option<Self> {
+        let is_count = (1..=MAX_REPEATS).contains(&u64::from(count));
+        is_count.then_some(Self { count, way: RepeatWay::Step(step) })
+    }
+
     /// Returns how often the shape stands in it.
     pub(super) fn count(&self) -> u64 {
         self.count.into()
@@ -198,7 +204,8 @@ impl Motion {
         Self { rotation, by_um: std::array::from_fn(|i| moved[i] + next.by_um[i]) }
     }
 
-    fn rotated(&self, point: [f64; 3]) -> [f64; 3] {
+    /// Returns a direction after the motion.
+    pub(super) fn rotated(&self, point: [f64; 3]) -> [f64; 3] {
         self.rotation.map(|row| row[0] * point[0] + row[1] * point[1] + row[2] * point[2])
     }
 

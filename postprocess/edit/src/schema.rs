@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use lamp_stack::{Length, LengthError, Op, Orientation};
 use serde::{Deserialize, Deserializer, de::Error as _};
 
+use super::film_hole::FilmHole;
 use super::letters::Align;
 use super::pattern::{Repeat, repeats};
 
@@ -37,6 +38,8 @@ pub(super) struct Edit {
     pub(super) strut: Option<StrutEnds>,
     pub(super) cone: Option<ConeEnds>,
     pub(super) sphere: Option<Sphere>,
+    pub(super) loft: Option<LoftShape>,
+    pub(super) film_hole: Option<FilmHole>,
     pub(super) label: Option<Label>,
     pub(super) picture: Option<PictureShape>,
     pub(super) stack: Option<OtherStack>,
@@ -171,6 +174,40 @@ pub(super) struct Sphere {
     pub(super) diameter: Length,
 }
 
+/// A solid whose section changes along a path.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LoftShape {
+    #[serde(deserialize_with = "path")]
+    pub(super) path: Vec<[Length; 3]>,
+    /// The radius of the axis at the path's corners.
+    #[serde(default, deserialize_with = "some_size")]
+    pub(super) bend: Option<Length>,
+    /// The direction of the width at the path's start; only its part across the path counts.
+    pub(super) across: Option<[f64; 3]>,
+    pub(super) sections: Vec<LoftSection>,
+}
+
+/// A round section, or a rectangle with round corners.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LoftSection {
+    /// The distance along the axis.
+    #[serde(default, deserialize_with = "distance")]
+    pub(super) at: Length,
+    #[serde(default, deserialize_with = "some_size")]
+    pub(super) diameter: Option<Length>,
+    #[serde(default, deserialize_with = "some_size")]
+    pub(super) width: Option<Length>,
+    #[serde(default, deserialize_with = "some_size")]
+    pub(super) height: Option<Length>,
+    #[serde(default, deserialize_with = "some_distance")]
+    pub(super) corner: Option<Length>,
+    /// How far its middle lies beside the axis, along width and height.
+    #[serde(default, deserialize_with = "lengths")]
+    pub(super) shift: [Length; 2],
+}
+
 /// A closed line around the same pixels in each layer.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -296,7 +333,9 @@ pub(super) fn lengths_of<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Lengt
     Vec::<String>::deserialize(from)?.iter().map(|text| length(text)).collect()
 }
 
-fn lengths<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[Length; N], D::Error> {
+pub(super) fn lengths<'de, D: Deserializer<'de>, const N: usize>(
+    from: D,
+) -> Result<[Length; N], D::Error> {
     let lengths = lengths_of(from)?;
     let count = lengths.len();
     lengths
@@ -339,6 +378,11 @@ fn corners<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<[Length; 2]>, D::Er
     }
 }
 
+fn path<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<[Length; 3]>, D::Error> {
+    let points: Vec<[String; 3]> = Vec::deserialize(from)?;
+    points.iter().map(|[x, y, z]| Ok([length(x)?, length(y)?, length(z)?])).collect()
+}
+
 fn distances<'de, D: Deserializer<'de>>(from: D) -> Result<[Length; 2], D::Error> {
     let distances: [Length; 2] = lengths(from)?;
     match distances.iter().find(|length| length.um() < 0.0) {
@@ -351,7 +395,7 @@ fn distances<'de, D: Deserializer<'de>>(from: D) -> Result<[Length; 2], D::Error
     }
 }
 
-fn distance<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
+pub(super) fn distance<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
     let length: Length = length(&String::deserialize(from)?)?;
     if length.um() < 0.0 {
         Err(D::Error::custom(format!("{length} is below zero")))
@@ -360,7 +404,13 @@ fn distance<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
     }
 }
 
-fn size<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
+pub(super) fn some_distance<'de, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Option<Length>, D::Error> {
+    distance(from).map(Some)
+}
+
+pub(super) fn size<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
     let length = distance(from)?;
     // Exactly zero is the last case: `distance` refuses all below.
     if length.um() == 0.0 { Err(D::Error::custom("it must be above zero")) } else { Ok(length) }

@@ -5,6 +5,7 @@ use lamp_stack::{Cone, Length, Strut};
 
 use super::edit_error::EditProblem;
 use super::fill::{PixelPoint, RunSet};
+use super::loft::Loft;
 use super::pattern::Motion;
 use super::pixel_map::PixelMap;
 use super::schema::{ConeEnds, Cylinder, CylinderAxis, Edit, Rectangle, Sphere, StrutEnds};
@@ -16,13 +17,14 @@ pub(super) enum Solid {
     Strut(Strut),
     Cone(Cone),
     Sphere(Sphere),
+    Loft(Loft),
 }
 
 impl Solid {
     /// Returns an edit's solid after a motion, if it has one.
     ///
     /// # Errors
-    /// Returns an error if a strut or cone has no length.
+    /// Returns an error if a strut or cone has no length, or a loft's keys contradict each other.
     pub(super) fn of(edit: &Edit, motion: &Motion) -> Result<Option<Self>, EditProblem> {
         if let Some(StrutEnds { from, to, diameter }) = edit.strut {
             let strut = Strut::new(motion.of(from), motion.of(to), diameter);
@@ -34,6 +36,9 @@ impl Solid {
         }
         if let Some(Sphere { at, diameter }) = edit.sphere {
             return Ok(Some(Self::Sphere(Sphere { at: motion.of(at), diameter })));
+        }
+        if let Some(shape) = &edit.loft {
+            return Ok(Some(Self::Loft(Loft::new(shape, motion)?)));
         }
         let lying = edit.cylinder.filter(|cylinder| cylinder.along != CylinderAxis::Z);
         lying.map(|cylinder| Self::lying(cylinder, motion)).transpose()
@@ -70,6 +75,7 @@ impl Solid {
             }
             Self::Strut(strut) => strut.heights(),
             Self::Cone(cone) => cone.heights(),
+            Self::Loft(loft) => loft.heights(),
         };
         (low..=high).contains(&height)
     }
@@ -95,6 +101,7 @@ impl Solid {
             Self::Cone(cone) => cone
                 .section(height, part.origin_mm, pitch, size)
                 .for_each(|(row, start, end)| runs.add(row, columns(start, end))),
+            Self::Loft(loft) => loft.draw(height, part, grid, runs),
             Self::Sphere(Sphere { at: [x, y, z], diameter }) => {
                 let [radius, off] = [diameter.um() / 2.0, height.um() - z.um()];
                 // The section of a sphere at height h has radius √(r² - h²). At its very top, which
