@@ -145,7 +145,12 @@ impl Working<'_> {
             }
             Self::Dither(..) => {}
             Self::Edit(editing, _) => {
-                findings.unused_edits.extend(editing.unused().map(|edit| (stage, edit)));
+                for count in editing.counts().iter().filter(|count| count.pixels == 0) {
+                    findings.unchanged_edits.insert((stage, count.edit));
+                    if count.layers == 0 {
+                        findings.unused_edits.insert((stage, count.edit));
+                    }
+                }
             }
         }
     }

@@ -6,7 +6,9 @@ use std::io::{self, Read, Seek};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use lamp_edit::{EditError, Edits, LabelList, OtherLayers, OtherPicture};
+use lamp_edit::{
+    EditError, Edits, LabelList, MadeEdit, OtherLayers, OtherPicture, VariantError, Variants,
+};
 use lamp_stack::{
     Layer, Limits, Op, Page, PageInfo, Pages, PassingLayer, StackError, digest_of, map_in_order,
 };
@@ -79,27 +81,83 @@ impl EditSettings {
                 return Ok(EditFiles { edits, stacks, pictures: vec![], lists: vec![] });
             }
         };
-        let text = read_text(list, MAX_LIST_BYTES, "a list of edits");
-        let text = text.map_err(|error| error.at(input_name(list)))?;
+        EditFiles::of_list(list, &list_text(list)?)
+    }
+}
+
+impl EditFiles {
+    /// Reads the text of a list, and the files that it names beside itself.
+    fn of_list(list: &Path, text: &str) -> Result<Self, Error> {
         let failed = |error| Error::new(ErrorKind::Work, error).at(input_name(list));
-        let edits = Edits::from_toml(&text).map_err(failed)?;
-        // Files stand beside the list that names them.
+        let edits = Edits::from_toml(text).map_err(failed)?;
         let folder = list.parent().unwrap_or(Path::new(""));
         let stacks = edits.stacks().map(|file| folder.join(file)).collect();
         let pictures = edits.pictures().map(|file| folder.join(file)).collect();
         let lists: Vec<_> = edits.lists().map(|file| folder.join(file)).collect();
         let texts = lists.iter().map(|file| open_list(file)).collect::<Result<_, Error>>()?;
         let edits = edits.with_lists(texts).map_err(failed)?;
-        Ok(EditFiles { edits, stacks, pictures, lists })
+        Ok(Self { edits, stacks, pictures, lists })
     }
+}
+
+fn list_text(list: &Path) -> Result<String, Error> {
+    let text = read_text(list, MAX_LIST_BYTES, "a list of edits");
+    text.map_err(|error| error.at(input_name(list)))
+}
+
+/// Reads the variants of a list of edits from a table.
+///
+/// # Errors
+/// Returns an error if the list or the table cannot be read, or is wrong.
+pub fn variants(list: &Path, table: &Path) -> Result<Variants, Error> {
+    let of_table = |error: Error| error.at(input_name(table));
+    let cells = read_text(table, MAX_LIST_BYTES, "a table of variants").map_err(of_table)?;
+    Variants::read(&list_text(list)?, &cells).map_err(|error| match error {
+        VariantError::List(error) => Error::new(ErrorKind::Work, error).at(input_name(list)),
+        error => of_table(Error::new(ErrorKind::Work, error)),
+    })
 }
 
 /// Layers that are being edited.
 pub struct Editing {
     list: Option<PathBuf>,
     files: EditFiles,
-    /// The number of layers in which each edit was made.
-    counts: RefCell<Vec<usize>>,
+    counts: RefCell<Vec<EditCount>>,
+}
+
+/// The changes by an edit so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct EditCount {
+    /// Number of the edit in the list, from 1.
+    pub edit: usize,
+    /// Number of layers that it applies to.
+    pub layers: usize,
+    /// Number of pixels that it changed, added or cut off in these layers.
+    pub pixels: u64,
+}
+
+impl EditCount {
+    /// Returns the sentence on what it changed.
+    pub fn text(&self) -> String {
+        let Self { edit, layers, pixels } = self;
+        format!("edit {edit}: {pixels} pixels changed in {layers} layers")
+    }
+
+    /// Returns the warning of an edit that changed nothing.
+    pub fn warning(&self) -> Option<String> {
+        (self.pixels == 0).then(|| unchanged_text(self.edit, self.layers == 0))
+    }
+}
+
+/// The changes by all edits, by `lamp edit --report`.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct EditHead {
+    /// Number of layers.
+    pub layers: usize,
+    /// Number of pixels that edits changed, added or cut off, each edit by itself.
+    pub pixels_changed: u64,
 }
 
 /// Has the notes on the pages of another stack or a picture printed or kept.
@@ -111,13 +169,25 @@ impl Editing {
     /// # Errors
     /// Returns an error if the list, or a list of labels that it names, is wrong.
     pub fn new(settings: &EditSettings) -> Result<Self, Error> {
-        let files = settings.files()?;
-        let counts = RefCell::new(vec![0; files.edits.count()]);
         let list = match settings {
             EditSettings::List { edits } => Some(edits.clone()),
             EditSettings::Combine { .. } => None,
         };
-        Ok(Self { list, files, counts })
+        Ok(Self::with(list, settings.files()?))
+    }
+
+    /// Reads the files that a variant of a list, as text, names beside that list.
+    ///
+    /// # Errors
+    /// Returns an error if the variant, or a list of labels that it names, is wrong.
+    pub fn of_variant(list: &Path, variant: &str) -> Result<Self, Error> {
+        Ok(Self::with(Some(list.to_owned()), EditFiles::of_list(list, variant)?))
+    }
+
+    fn with(list: Option<PathBuf>, files: EditFiles) -> Self {
+        let none = |number| EditCount { edit: number, layers: 0, pixels: 0 };
+        let counts = RefCell::new((1..=files.edits.count()).map(none).collect());
+        Self { list, files, counts }
     }
 
     /// Returns all files that are read.
@@ -150,26 +220,34 @@ impl Editing {
         let others = stacks.iter().map(other).collect::<Result<_, Error>>()?;
         let pictures =
             pictures.iter().map(|file| open_picture(file, noting)).collect::<Result<_, Error>>();
-        let count = move |page: &PageInfo, done: &[usize]| {
-            if counted.contains(&page.index) {
-                done.iter().for_each(|&edit| self.counts.borrow_mut()[edit] += 1);
+        let count = move |page: &PageInfo, made: &[MadeEdit]| {
+            for made in made.iter().filter(|_| counted.contains(&page.index)) {
+                let count = &mut self.counts.borrow_mut()[made.edit];
+                (count.layers, count.pixels) = (count.layers + 1, count.pixels + made.pixels);
             }
         };
         Ok(lamp_edit::edit(layers, edits.clone(), others, pictures?, count))
     }
 
-    /// Returns the edits, from 1, that were made in no layer so far.
-    pub fn unused(&self) -> impl Iterator<Item = usize> {
-        let unused = |(number, count): (usize, &usize)| (*count == 0).then_some(number);
-        // Collected, since the borrow of the counts ends here.
-        let unused: Vec<_> = (1..).zip(self.counts.borrow().iter()).filter_map(unused).collect();
-        unused.into_iter()
+    /// Returns the changes so far by all edits in `layers` layers.
+    pub fn head(&self, layers: usize) -> EditHead {
+        let counts = self.counts.borrow();
+        EditHead { layers, pixels_changed: counts.iter().map(|count| count.pixels).sum() }
+    }
+
+    /// Returns the changes so far, edit by edit.
+    pub fn counts(&self) -> Vec<EditCount> {
+        self.counts.borrow().clone()
     }
 }
 
-/// Returns the sentence on an edit that was made in no layer.
-pub fn unused_text(edit: usize) -> String {
-    format!("edit {edit} applies to no layer: check its z or layers")
+/// Returns the sentence on an edit that changed no pixel, or applies to no layer at all.
+pub(crate) fn unchanged_text(edit: usize, is_unused: bool) -> String {
+    if is_unused {
+        format!("edit {edit} applies to no layer: check its z or layers")
+    } else {
+        format!("edit {edit} changes no pixel: check its place, and whether it adds or subtracts")
+    }
 }
 
 /// Returns the layers of another stack or a picture, decoded, in order.

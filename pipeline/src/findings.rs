@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::edit::unused_text;
+use crate::edit::unchanged_text;
 use crate::fix_report::FixReport;
 use crate::slice::Counts;
 
@@ -31,6 +31,8 @@ pub struct RangeFindings {
     pub is_blank: bool,
     /// Edits that were made in no layer: the stage's place and the edit's number.
     pub(crate) unused_edits: BTreeSet<(usize, usize)>,
+    /// Edits that changed no pixel, those of no layer included.
+    pub(crate) unchanged_edits: BTreeSet<(usize, usize)>,
     /// Lines about the part.
     pub of_part: Vec<String>,
     /// Lines about ranges.
@@ -73,6 +75,7 @@ impl RangeFindings {
         self.is_blank &= other.is_blank;
         // An edit that one range uses is used.
         self.unused_edits.retain(|edit| other.unused_edits.contains(edit));
+        self.unchanged_edits.retain(|edit| other.unchanged_edits.contains(edit));
         // Every range opens the part, and finds the same about it.
         other.of_part.retain(|line| !self.of_part.contains(line));
         self.of_part.append(&mut other.of_part);
@@ -83,9 +86,10 @@ impl RangeFindings {
     /// Returns the messages, once all ranges are joined.
     pub fn notes(&self) -> Vec<String> {
         let blank = self.is_blank.then(|| "slice: no layer has a white pixel".to_owned());
-        let unused =
-            self.unused_edits.iter().map(|(_, edit)| format!("edit: {}", unused_text(*edit)));
+        let unchanged = self.unchanged_edits.iter().map(|edit| {
+            format!("edit: {}", unchanged_text(edit.1, self.unused_edits.contains(edit)))
+        });
         let said = self.of_part.iter().chain(&self.of_range).cloned();
-        said.chain(blank).chain(unused).collect()
+        said.chain(blank).chain(unchanged).collect()
     }
 }

@@ -200,7 +200,9 @@ fn report_of(stage: &Working<'_>, work: &Work, name: &str, layers: usize) -> Val
             json!({ "stage": "dither", "method": settings.method.name() })
         }
         Working::Edit(editing, _) => {
-            json!({ "stage": "edit", "unused": editing.unused().collect::<Vec<_>>() })
+            let counts = editing.counts();
+            let unused = counts.iter().filter(|count| count.layers == 0).map(|count| count.edit);
+            json!({ "stage": "edit", "unused": unused.collect::<Vec<_>>(), "edits": counts })
         }
     }
 }

@@ -396,6 +396,101 @@ fn what_is_wrong_is_said_with_the_edit_and_the_key() {
     assert!(said.contains("edit 1 applies to no layer"), "{said}");
 }
 
+/// Returns the TOML examples of the manual's section.
+fn examples_of(heading: &str) -> String {
+    let docs = std::fs::read_to_string(workspace_root().join("docs/edit.md")).unwrap();
+    let (_, section) = docs.split_once(&format!("\n## {heading}\n")).unwrap();
+    let section = section.split("\n## ").next().unwrap();
+    let blocks = section.split("```toml\n").skip(1);
+    blocks.map(|block| block.split("```").next().unwrap()).collect()
+}
+
+#[test]
+fn the_examples_of_lofts_and_film_holes_drill_the_cube() {
+    let scratch = with_cube();
+    scratch.write("loft.toml", examples_of("Lofts").as_bytes());
+    scratch.write("film.toml", examples_of("Film-cooling holes").as_bytes());
+    scratch.run("lamp edit cube.tif loft.toml -o loft.tif").succeeds_quietly();
+    scratch.run("lamp edit cube.tif film.toml -o film.tif").succeeds_quietly();
+    let (loft, film) = (scratch.layers("loft.tif"), scratch.layers("film.tif"));
+    // The loft begins 1 mm wide at x = -8, z = 4, where the cube's hole is not.
+    for (y, is) in [(0.0, false), (0.4, false), (0.6, true)] {
+        assert_eq!(white_at(&loft[8], [-7.95, y]), is, "{y}");
+    }
+    // Each axis of the row leaves the side x = 10 at its z: 3 mm, 5.4 mm and so on to 15 mm.
+    let open = |z: f64| !white_at(&film[(z / 0.5) as usize], [9.95, 0.0]);
+    for k in 0..6 {
+        assert!(open(3.0 + 2.4 * f64::from(k)), "{k}");
+    }
+    assert!(!open(1.0) && !open(17.4));
+}
+
+#[test]
+fn a_table_makes_a_stack_or_a_list_of_each_row() {
+    let scratch = with_cube();
+    let list = "[[edit]]\nop = \"subtract\"\nz = [\"0mm\", \"1mm\"]\n\
+                box = { x = [\"6mm\", \"7mm\"], y = [\"-1mm\", \"1mm\"] }\n";
+    scratch.write("edits.toml", list.as_bytes());
+    scratch.write(
+        "table.csv",
+        b"name,1.box.x,1.z.2\nwide,\"[\"\"6mm\"\", \"\"8mm\"\"]\",\nhigh,,4mm\n",
+    );
+    let run = "lamp edit cube.tif edits.toml --variants table.csv";
+    scratch.run(&format!("{run} --report n-{{name}}.json -o v-{{name}}.tif")).succeeds_quietly();
+    scratch.run(&format!("{run} -o v-{{name}}.toml")).succeeds_quietly();
+    let before = scratch.layers("cube.tif");
+    for (name, layers, pixels) in [("wide", 2, 400), ("high", 8, 200)] {
+        let after = scratch.layers(&format!("v-{name}.tif"));
+        let lost = |k: usize| mask(&before[k]).white_pixels() - mask(&after[k]).white_pixels();
+        let expected = |k: usize| if k < layers { pixels } else { 0 };
+        assert!((0..40).all(|k| lost(k) == expected(k)), "{name}");
+        let report = scratch.bytes(&format!("n-{name}.json"));
+        let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
+        assert_eq!(report["pixels_changed"], layers as u64 * pixels);
+        let counts =
+            serde_json::json!([{ "edit": 1, "layers": layers, "pixels": layers as u64 * pixels }]);
+        assert_eq!((&report["schema"], &report["edits"]), (&"lamp-edit-1".into(), &counts));
+        // The list alone makes the same stack.
+        scratch.run(&format!("lamp edit cube.tif v-{name}.toml -o again.tif")).succeeds_quietly();
+        assert_eq!(scratch.bytes("again.tif"), scratch.bytes(&format!("v-{name}.tif")));
+    }
+    let names = scratch.names();
+    scratch.write("bad.csv", b"1.box.z\n3mm\n");
+    let bad = "lamp edit cube.tif edits.toml --variants bad.csv -o w-{name}.tif";
+    scratch.run(bad).is_refused_with(&["bad.csv", "`1.box.z`"]);
+    scratch.run(&format!("{run} -o one.tif")).is_wrong_usage(&["{name}", "-o"]);
+    scratch
+        .run(&format!("{run} --report one.json -o w-{{name}}.tif"))
+        .is_wrong_usage(&["--report"]);
+    scratch
+        .run("lamp edit - edits.toml --variants table.csv -o w-{name}.tif")
+        .is_wrong_usage(&["name files"]);
+    assert_eq!(scratch.names().len(), names.len() + 1);
+}
+
+#[test]
+fn an_edit_that_changes_no_pixel_gets_a_warning() {
+    let scratch = with_cube();
+    // In the cube's own hole.
+    let list =
+        "[[edit]]\nop = \"subtract\"\ncylinder = { at = [\"0mm\", \"0mm\"], diameter = \"4mm\" }\n";
+    scratch.write("none.toml", list.as_bytes());
+    let said = scratch.run("lamp edit cube.tif none.toml -v -o out.tif").succeeds().stderr;
+    assert!(said.contains("warning: edit: edit 1 changes no pixel"), "{said}");
+    assert!(said.contains("edit 1: 0 pixels changed in 40 layers"), "{said}");
+    scratch.write("some.toml", list.replace("subtract", "add").as_bytes());
+    let ran = scratch.run("lamp edit cube.tif some.toml --json -o out.tif").succeeds_quietly();
+    let [before, after] = ["cube.tif", "out.tif"].map(|name| scratch.layers(name));
+    let pixels: u64 = before
+        .iter()
+        .zip(&after)
+        .map(|(before, after)| mask(after).white_pixels() - mask(before).white_pixels())
+        .sum();
+    let report: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap();
+    assert_eq!(report["edits"][0]["pixels"], pixels);
+    assert!(pixels > 40 * 1200);
+}
+
 /// A PBM of a plus sign, in which 1 is black, and a BMP of the same in 256 levels of gray.
 fn plus_signs() -> (Vec<u8>, Vec<u8>) {
     let is_white = |column: u32, row: u32| column == 1 || row == 1;

@@ -1,14 +1,18 @@
 //! `lamp edit`: changes a stack at image level.
 
+use std::path::{Path, PathBuf};
+
 use clap::Args;
 use lamp_edit::EditError;
-use lamp_pipeline::edit::{EditSettings, Editing, unused_text};
+use lamp_pipeline::edit::{EditSettings, Editing, variants};
 
 use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::EditStageArgs;
 use crate::exit::Exit;
+use crate::output::json_report::{JsonReport, ReportTo, schemas};
 use crate::streams::{
-    check_not_input, input_name, is_stream, progress, read_passing, write_layers,
+    check_beside, check_not_input, extension, input_name, is_stream, progress, read_passing,
+    write_file, write_layers,
 };
 use crate::terminal::stack_notes::noting;
 
@@ -29,6 +33,7 @@ Examples:
   lamp edit blade.tif edits.toml -o variant.tif
   slice blade.stl | fix | lamp edit - edits.toml | tile > build.tif
   lamp edit shell.tif --difference core.tif -o hollow.tif
+  lamp edit blade.tif edits.toml --variants holes.csv -o 'blade-{name}.tif'
 
 An edits.toml:
   [[edit]]
@@ -42,9 +47,24 @@ pub(crate) struct EditArgs {
     #[command(flatten)]
     settings: EditStageArgs,
 
+    /// Make a variant for each row of this table: columns such as 1.cylinder.diameter replace values
+    /// of the list, and {name} in the name of the output (and of the report) is the row's name or
+    /// number. An output that ends in .toml is the variant's list
+    #[arg(
+        long,
+        value_name = "TABLE.csv",
+        conflicts_with_all = ["union", "intersect", "difference", "xor", "json"]
+    )]
+    variants: Option<PathBuf>,
+
+    #[command(flatten)]
+    report: ReportTo,
+
     #[command(flatten)]
     output: Output,
 }
+
+schemas! { "lamp-edit-1": lamp_pipeline::edit::EditHead, "edits": [lamp_pipeline::edit::EditCount]; }
 
 impl EditArgs {
     fn check_streams(&self, settings: &EditSettings) -> Result<(), Exit> {
@@ -61,14 +81,69 @@ impl EditArgs {
 pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
     let settings = EditSettings::from(&args.settings);
     args.check_streams(&settings)?;
-    let editing = Editing::new(&settings)?;
-    check_not_input(&args.output.output, editing.inputs())?;
-    let progress = progress("edit", common, &args.output);
+    args.report.check_output(&args.output.output)?;
+    match &args.variants {
+        None => make(&Editing::new(&settings)?, args, &args.output, args.report.path(), common),
+        Some(table) => make_variants(args, settings.named(), table, common),
+    }
+}
+
+/// The name of a variant in the names of its files.
+const NAME: &str = "{name}";
+
+/// Makes a stack, or a list of edits, of each row of a table.
+fn make_variants(args: &EditArgs, list: &Path, table: &Path, common: &Common) -> Result<(), Exit> {
+    if is_stream(&args.input.stack) || is_stream(list) || is_stream(table) {
+        return Err(Exit::usage("--variants reads its inputs again and again: name files"));
+    }
+    let template = |path: &Path, option: &str| match path.to_str() {
+        Some(text) if text.contains(NAME) => Ok(text.to_owned()),
+        _ => Err(Exit::usage(format!(
+            "--variants writes several files: write {NAME} in the name of {option}"
+        ))),
+    };
+    let output = template(&args.output.output, "-o")?;
+    let report = args.report.path().map(|path| template(path, "--report")).transpose()?;
+    let is_list = extension(&args.output.output) == "toml";
+    if is_list && report.is_some() {
+        return Err(Exit::usage("--report is of stacks: lists of edits change nothing yet"));
+    }
+    let variants = variants(list, table)?;
+    let inputs = [&args.input.stack, &list.to_owned(), &table.to_owned()];
+    for (k, name) in variants.names().enumerate() {
+        let named = |template: &String| PathBuf::from(template.replace(NAME, name));
+        let output = Output { output: named(&output), ..args.output.clone() };
+        check_not_input(&output.output, inputs)?;
+        let text = variants.list(k);
+        if is_list {
+            write_file(&output.output, |out| out.write_all(text.as_bytes()))?;
+            continue;
+        }
+        let editing = Editing::of_variant(list, &text)?;
+        make(&editing, args, &output, report.as_ref().map(named).as_ref(), common)?;
+    }
+    Ok(())
+}
+
+/// Edits a stack, and reports what each edit changed.
+fn make(
+    editing: &Editing,
+    args: &EditArgs,
+    output: &Output,
+    report: Option<&PathBuf>,
+    common: &Common,
+) -> Result<(), Exit> {
+    if let Some(beside) = report {
+        check_beside(beside, &output.output, editing.inputs().chain([&args.input.stack]))?;
+    }
+    check_not_input(&output.output, editing.inputs())?;
+    let progress = progress("edit", common, output);
     // Layers that are not wanted are no loss.
     let is_whole = [args.input.layers.is_none(); 2];
-    let layers = read_passing(&args.input, &progress)?;
+    let mut layer_count = 0;
+    let layers = read_passing(&args.input, &progress)?.inspect(|_| layer_count += 1);
     let edited = editing.layers(layers, 0..u32::MAX, is_whole, &noting)?;
-    write_layers(edited, &args.output, &progress).map_err(|error| match error {
+    write_layers(edited, output, &progress).map_err(|error| match error {
         // A page that cannot be decoded names its stack.
         error if matches!(error.cause(), Some(EditError::Page(_))) => error,
         Exit::Failed(error) if error.is::<EditError>() => {
@@ -76,6 +151,15 @@ pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
         }
         error => error,
     })?;
-    editing.unused().for_each(|edit| progress.say(&unused_text(edit)));
-    Ok(())
+    let counts = editing.counts();
+    for count in &counts {
+        progress.detail(&count.text());
+        count.warning().iter().for_each(|warning| progress.warn(warning));
+    }
+    match report {
+        Some(path) => JsonReport::of_schema("lamp-edit-1", &editing.head(layer_count))
+            .list("edits", counts)
+            .write(path),
+        None => Ok(()),
+    }
 }

@@ -47,7 +47,7 @@ const PLAN: &str = "plan";
 const VOXELS_MEMORY: u64 = 2_000_000_000;
 
 /// Options that make no sense in a list of stages, and what to do instead.
-const REFUSED: [(&str, &str); 26] = [
+const REFUSED: [(&str, &str); 27] = [
     ("output", "leave out -o: results go where the whole list of stages sends them"),
     ("format", "leave out --format: results are stored packed"),
     ("classic", "leave out --classic: results are stored packed"),
@@ -61,6 +61,7 @@ const REFUSED: [(&str, &str); 26] = [
     ("options", "leave out --options: write its options into the stage"),
     ("plan", "leave out --plan: run lamp support by hand for its plan"),
     ("cell", "leave out --cell: run dither by hand, for cells look at layers far above and below"),
+    ("variants", "leave out --variants: a part's stages make one stack"),
     ("vent", "leave out --vent: run lamp support by hand for holes that drain pockets"),
     ("avoid", "leave out --avoid: run lamp support by hand around surfaces to avoid"),
     ("stl", "leave out --stl: run lamp support by hand for only its supports"),

@@ -90,8 +90,8 @@ pub enum EditProblem {
     ManyRepeats,
     /// A pattern moves or tilts a shape that has no height of its own.
     #[error(
-        "only struts, cones, spheres, lofts, film holes and lying cylinders step up and turn about \
-         other axes than z: z or layers are for all repeats"
+        "only struts, cones, spheres, lofts and lying cylinders step up and turn about other axes \
+         than z: z or layers are for all repeats"
     )]
     RepeatUp,
     /// A pattern turns a picture by other angles than quarters.

@@ -72,6 +72,48 @@ fn stamped(layers: Vec<Layer>, list: &str, pages: Vec<Layer>) -> Result<Vec<Laye
     edited.map(|layer| layer.and_then(|layer| Ok(layer.decode()?))).collect()
 }
 
+#[test]
+fn each_edit_counts_its_pixels() {
+    let list = r#"
+        [[edit]]
+        box = { x = ["4mm", "7mm"], y = ["0mm", "2mm"] }
+        [[edit]]
+        op = "subtract"
+        box = { x = ["6mm", "9mm"], y = ["0mm", "2mm"] }
+        z = ["0mm", "1mm"]
+        [[edit]]
+        op = "subtract"
+        box = { x = ["9mm", "10mm"], y = ["0mm", "2mm"] }
+        [[edit]]
+        pad = { left = "2mm" }
+        [[edit]]
+        crop = { x = ["1mm", "14mm"], y = ["-2mm", "7mm"] }
+        [[edit]]
+        mirror = "y"
+        [[edit]]
+        rotate = 90
+        [[edit]]
+        z = ["5mm", "6mm"]
+        box = { x = ["4mm", "7mm"], y = ["0mm", "2mm"] }
+    "#;
+    let layers = (0..2).map(|k| layer(k, Image::Mask(Mask::black(WIDTH, HEIGHT))));
+    let mut made = Vec::new();
+    let edits = Edits::from_toml(list).unwrap();
+    let layers = layers.map(Ok::<_, EditError>);
+    let edited = edit(layers, edits, vec![], vec![], |page, edits| {
+        made.extend(edits.iter().map(|made| (page.index, made.edit, made.pixels)));
+    });
+    assert_eq!(edited.map(Result::unwrap).count(), 2);
+    // After two edits the lowest layer has 4 white pixels of rows 5 and 6, the next one 6. Mirrored,
+    // row 5 changes places with row 3, and row 6 with row 2.
+    let of_layer = |k: u32, white: u64| {
+        let cut = (k == 0).then_some((k, 1, 2));
+        let sizes = [(k, 2, 0), (k, 3, 18), (k, 4, 9), (k, 5, 2 * white), (k, 6, 13 * 9)];
+        [(k, 0, 6)].into_iter().chain(cut).chain(sizes)
+    };
+    assert_eq!(made, of_layer(0, 4).chain(of_layer(1, 6)).collect::<Vec<_>>());
+}
+
 /// Quarters of a millimeter, so that many edges lie on centers.
 fn span(from: std::ops::Range<i32>) -> impl Strategy<Value = [f64; 2]> {
     (from, 1i32..20)

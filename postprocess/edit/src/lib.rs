@@ -30,6 +30,7 @@ mod schema;
 mod serials;
 mod shape;
 mod solid;
+mod variants;
 
 use std::sync::Arc;
 
@@ -42,13 +43,24 @@ pub use loft::LoftProblem;
 pub use other_stacks::OtherLayers;
 pub use pictures::OtherPicture;
 pub use serials::{LabelList, ListProblem};
+pub use variants::{VariantError, Variants};
 
 use other_stacks::AlignedStack;
 use plan::EditPlan;
 
+/// An edit that was made in a layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MadeEdit {
+    /// Its index in the list.
+    pub edit: usize,
+    /// The number of pixels that it changed. Of images that change their size, the number of pixels
+    /// that they gain or lose, or, if they turn, all.
+    pub pixels: u64,
+}
+
 /// Makes a list of edits in every layer of a stack. `others` are the stacks that the
 /// edits name, in order, and `pictures` the pictures. `done` is called with each
-/// layer's page and the indices of the edits that were made in it.
+/// layer's page and the edits that were made in it.
 ///
 /// Shapes and stacks lie in the part's coordinates. A pixel is in a shape if its center
 /// is, a layer in a range of heights if its middle is. Only layers whose image an edit changes are
@@ -87,7 +99,7 @@ pub fn edit<E: From<EditError> + Send>(
     edits: Edits,
     others: Vec<OtherLayers<E>>,
     mut pictures: Vec<OtherPicture<E>>,
-    mut done: impl FnMut(&PageInfo, &[usize]),
+    mut done: impl FnMut(&PageInfo, &[MadeEdit]),
 ) -> impl Iterator<Item = Result<PassingLayer, E>> {
     let mut beside = AlignedStacks::new(&edits, others);
     let mut plan: Option<Arc<EditPlan>> = None;

@@ -292,7 +292,7 @@ fn what_cannot_be_repeated_is_said() {
     for (shape, repeat, said) in [
         ("rotate = 90", ring, "edit 1: repeat is for shapes, labels and pictures"),
         ("stack = { file = \"a.tif\" }", ring, "edit 1: repeat is for shapes"),
-        (block, up, "edit 1: only struts, cones, spheres and lying cylinders step up"),
+        (block, up, "edit 1: only struts, cones, spheres, lofts and lying cylinders step up"),
         (block, tilted, "edit 1: only struts"),
         (block, many, "edit 1: it repeats more than 100000 times"),
         (picture, ring, "edit 1: pictures can be turned only by 90, 180 or 270 degrees"),

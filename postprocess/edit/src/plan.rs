@@ -11,6 +11,7 @@ use lamp_stack::{
 };
 use serde_json::json;
 
+use super::MadeEdit;
 use super::copies::BuildCopy;
 use super::edit_error::{EditError, EditProblem, LayerProblem};
 use super::frames::{cropped, frame_of, padded};
@@ -142,13 +143,12 @@ impl EditPlan {
     }
 
     /// Makes the edits in a layer, with the layers of `others` at its height. Also
-    /// returns the indices of the edits that were for it. A layer whose image stays as it is
-    /// is not decoded.
+    /// returns the edits that were for it. A layer whose image stays as it is is not decoded.
     pub(super) fn apply(
         &self,
         mut layer: PassingLayer,
         others: &[Option<Arc<Layer>>],
-    ) -> Result<(PassingLayer, Vec<usize>), EditError> {
+    ) -> Result<(PassingLayer, Vec<MadeEdit>), EditError> {
         // The planned pixels are right in this rectangle only.
         if ImageBounds::of(layer.info(), layer.pitch(), layer.size()) != self.place {
             return Err(EditError::Unlike { layer: layer.info().name() });
@@ -161,11 +161,14 @@ impl EditPlan {
                 if matches!(step, PlannedEdit::Other { .. }) { others.next() } else { None };
             let other = other.and_then(Option::as_deref);
             if step.is_for(layer.info())? {
+                let mut pixels = 0;
                 if !step.keeps_images_of(layer.size()) {
                     let Layer { info, pitch, image } = layer.decode()?;
-                    let image = step.of_image(&image, &info, other)?;
+                    let edited = step.of_image(&image, &info, other)?;
                     let too_many = || LayerProblem::TooManyRuns { edit: k + 1 }.of_layer(&info);
-                    let image = image.ok_or_else(too_many)?.into();
+                    let edited = edited.ok_or_else(too_many)?;
+                    pixels = changed_pixels(&image, &edited);
+                    let image = edited.into();
                     let pitch = match step {
                         PlannedEdit::Turn { place, .. } => place.pitch,
                         _ => pitch,
@@ -173,7 +176,7 @@ impl EditPlan {
                     layer = Layer { info, pitch, image }.into();
                 }
                 step.follow(layer.info_mut())?;
-                done.push(k);
+                done.push(MadeEdit { edit: k, pixels });
             }
         }
         if let Some(stack) = &mut layer.info_mut().stack {
@@ -307,6 +310,18 @@ impl Edit {
     pub(super) fn adds_at_all_heights(&self) -> bool {
         matches!(LayerSelection::of(self), LayerSelection::All)
             && matches!(self.op(), Op::Union | Op::Xor)
+    }
+}
+
+/// Returns the number of pixels that an edit changed; of images that changed their size, those that
+/// they gained or lost, or, if they were turned, all.
+fn changed_pixels(before: &Image, after: &Image) -> u64 {
+    let [was, is] = [before, after].map(|image| [image.width(), image.height()]);
+    let [pixels, left] = [was, is].map(|[width, height]| u64::from(width) * u64::from(height));
+    match was == is {
+        true => before.differing_pixels(after),
+        false if pixels == left => pixels,
+        false => pixels.abs_diff(left),
     }
 }
 

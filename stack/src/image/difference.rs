@@ -95,6 +95,33 @@ impl Difference {
     }
 }
 
+impl Image {
+    /// Returns the number of pixels whose levels differ from another image's of the same size.
+    ///
+    /// # Panics
+    /// Panics if the sizes differ.
+    pub fn differing_pixels(&self, other: &Self) -> u64 {
+        assert_eq!((self.width(), self.height()), (other.width(), other.height()));
+        match (self, other) {
+            (Self::Mask(a), Self::Mask(b)) => differing(a, b),
+            (a, b) => differing(&*a.to_gray(), &*b.to_gray()),
+        }
+    }
+}
+
+fn differing<C: Change>(a: &RunImage<C>, b: &RunImage<C>) -> u64 {
+    let (mut sum, width) = (0, a.width());
+    for (a, b) in a.rows().zip(b.rows()).filter(|(a, b)| a != b) {
+        let mut from = None;
+        walk_rows([a, b], |column, [a, b]| {
+            sum += u64::from(column - from.take().unwrap_or(column));
+            from = (a != b).then_some(column);
+        });
+        sum += u64::from(width - from.unwrap_or(width));
+    }
+    sum
+}
+
 /// Gives a row of transitions a color from a column on.
 fn toggle(row: &mut Vec<u32>, column: u32, is_white: bool) {
     if (row.len() % 2 == 1) != is_white {
@@ -190,6 +217,21 @@ mod tests {
             check(&a, &b, shift);
             check(&masks[0], &masks[1], shift);
             check(&a, &masks[1], shift);
+        }
+
+        #[test]
+        fn pixels_that_differ_are_counted(
+            [a, b] in [arbitrary_gray(), arbitrary_gray()],
+            level in 0u8..=255,
+        ) {
+            let frame = Frame { left: 0, top: 0, width: a.width(), height: a.height() };
+            let [a, b] = [Image::Gray(a), Image::Gray(b).framed(frame)];
+            let masks = [&a, &b].map(|image| Image::Mask(image.to_gray().at_least(level.max(1))));
+            for [a, b] in [[&a, &b], [&masks[0], &masks[1]], [&a, &masks[1]]] {
+                let pixels = (0..a.width()).flat_map(|c| (0..a.height()).map(move |r| (c, r)));
+                let differ = pixels.filter(|&(c, r)| a.level(c, r) != b.level(c, r));
+                prop_assert_eq!(a.differing_pixels(b), differ.count() as u64);
+            }
         }
 
         #[test]
