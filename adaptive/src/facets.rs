@@ -5,7 +5,7 @@
 //! that it makes a layer lose or gain is a cubic polynomial of the layer's top. The segments in
 //! which facets cut the layer's bottom enclose the section there.
 
-use lamp_slicing::PlacedFacet;
+use lamp_slicing::{PlacedFacet, Side};
 use rayon::prelude::*;
 
 use crate::profile::{ChangeProfile, ProfileChange, SurfacePiece};
@@ -29,7 +29,12 @@ pub(crate) struct FacetSums {
 impl FacetSums {
     /// Sums facets up, with tops above the bottom in micrometers, rising. Returns nothing if
     /// there are no facets.
-    pub(crate) fn sum(facets: &[(PlacedFacet, u32)], bottom_um: f64, tops: &[f64]) -> Option<Self> {
+    pub(crate) fn sum(
+        facets: &[(PlacedFacet, u32)],
+        bottom_um: f64,
+        tops: &[f64],
+        side: Side,
+    ) -> Option<Self> {
         let [x, y, _] = facets.first()?.0[0];
         let of_chunk = |chunk: &[(PlacedFacet, u32)]| {
             let (mut profile, mut bottom) = (ChangeProfile::new(tops), Contours::default());
@@ -37,7 +42,7 @@ impl FacetSums {
                 // From a corner nearby, so that areas do not drown in rounding.
                 let facet =
                     facet.map(|corner| [corner[0] - x, corner[1] - y, corner[2] - bottom_um]);
-                add_facet(&facet, &mut profile);
+                add_facet(&facet, side, &mut profile);
                 bottom.add_facet(&facet);
             }
             Self { changes: profile.changes(), bottom }
@@ -65,7 +70,7 @@ impl FacetSums {
 }
 
 /// Adds the part of a facet that is above the bottom, at height 0.
-fn add_facet(facet: &PlacedFacet, profile: &mut ChangeProfile<'_>) {
+fn add_facet(facet: &PlacedFacet, side: Side, profile: &mut ChangeProfile<'_>) {
     let mut heights = facet.map(|corner| corner[2]);
     heights.sort_unstable_by(f64::total_cmp);
     let [low, middle, high] = heights;
@@ -76,8 +81,8 @@ fn add_facet(facet: &PlacedFacet, profile: &mut ChangeProfile<'_>) {
     }
     let mut add = |heights: [f64; 2], extent: f64, density| {
         let [lost, gained] = if area > 0.0 { [heights, [0.0; 2]] } else { [[0.0; 2], heights] };
-        let section = -area.signum();
-        profile.add(SurfacePiece { heights, extent, density, section, lost, gained });
+        let (section, outline) = (-area.signum(), outline(side, area < 0.0));
+        profile.add(SurfacePiece { heights, extent, density, section, outline, lost, gained });
     };
     let whole = area.abs();
     if low == high {
@@ -103,6 +108,16 @@ fn add_facet(facet: &PlacedFacet, profile: &mut ChangeProfile<'_>) {
             let cut = [at_bottom / mean, density[1] / mean];
             add([0.0, ends[1]], extent * share * mean, cut);
         }
+    }
+}
+
+/// Returns how much of the first surface on the way up a column all sections together gain, or lose
+/// if the number is negative. `enters` is true if the way up enters the part there.
+pub(crate) fn outline(side: Side, enters: bool) -> f64 {
+    match (side, enters) {
+        (Side::Outside, true) => 1.0,
+        (Side::Inside, false) => -1.0,
+        _ => 0.0,
     }
 }
 

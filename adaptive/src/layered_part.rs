@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use lamp_slicing::scan::RowFacet;
-use lamp_slicing::{FacetIndex, Fill, FillRule, PlacedFacet, facet_heights};
+use lamp_slicing::{FacetIndex, Fill, FillRule, PlacedFacet, Side, facet_heights};
 use lamp_stack::Length;
 use rayon::prelude::*;
 
@@ -54,6 +54,7 @@ pub struct LayeredPart {
     facets: FacetIndex,
     rows: Rows,
     rule: FillRule,
+    side: Side,
     mesh: OnceLock<MeshFacts>,
     /// Found for the thickest layers asked about so far.
     overlaps: Mutex<Option<Arc<OverlapRows>>>,
@@ -81,7 +82,19 @@ impl LayeredPart {
         }
         let rows = Rows { top_mm: facets.max()[1], pitch_mm: pitch.mm(), count: count as u32 };
         let rule = facets.fill_rule(fill);
-        Ok(Self { facets, rows, rule, mesh: OnceLock::new(), overlaps: Mutex::new(None) })
+        let (mesh, overlaps) = (OnceLock::new(), Mutex::new(None));
+        Ok(Self { facets, rows, rule, side: Side::Both, mesh, overlaps })
+    }
+
+    /// Builds layers on a side of the part: of all sections between their bottom and their top,
+    /// instead of the section at the top.
+    #[must_use]
+    pub fn on_side(self, side: Side) -> Self {
+        Self { side, ..self }
+    }
+
+    pub(crate) fn side(&self) -> Side {
+        self.side
     }
 
     /// Returns the heights of the lowest and the highest point, in micrometers.
@@ -165,7 +178,7 @@ impl LayeredPart {
         let steepest = steepest(&facets, bottom_um, tops_um);
         let layer = |k: usize| {
             let section = SweptSection { plane_um: planes[k], bottom_area, change: changes[k] };
-            let layer = section.swept(bottom_um, tops_um[k] - bottom_um);
+            let layer = section.swept(bottom_um, tops_um[k] - bottom_um, self.side);
             SweptLayer { steepest: steepest[k], rows_left_out, ..layer }
         };
         SweptLayers {
@@ -178,7 +191,7 @@ impl LayeredPart {
     /// how rows differ from them. Where the mesh has a gap, rows alone count.
     fn all(&self, facets: &[(PlacedFacet, u32)], z_um: [f64; 2], planes: &[f64]) -> Rise {
         let stripes = self.stripes(facets);
-        let closed = FacetSums::sum(facets, z_um[0], planes)
+        let closed = FacetSums::sum(facets, z_um[0], planes, self.side)
             .filter(super::facets::FacetSums::bottom_is_closed);
         if let Some(sum) = closed {
             let mut rise = self.rows(&stripes, z_um, planes, RowsAdd::Differences);
@@ -227,7 +240,7 @@ impl LayeredPart {
     }
 
     pub(crate) fn sweep(&self, adds: RowsAdd) -> Sweep<'_> {
-        Sweep::new(&self.rule, self.rows.pitch_mm, adds)
+        Sweep::new(&self.rule, self.side, self.rows.pitch_mm, adds)
     }
 
     /// Returns what some rows add, from the first on.

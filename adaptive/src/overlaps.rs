@@ -174,7 +174,7 @@ impl<'a> Overlaps<'a> {
                     section.bottom_area += rise.bottom_area;
                     section.change.add(rise.changes[k]);
                 }
-                SweptLayer { steepest, ..section.swept(bottom_um, thickness_um) }
+                SweptLayer { steepest, ..section.swept(bottom_um, thickness_um, self.part.side()) }
             };
         told.into_iter().enumerate().map(layer).collect()
     }

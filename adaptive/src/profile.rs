@@ -18,11 +18,15 @@ const MANY_TOPS: usize = 6;
 /// all tops, it would suffer from rounding.
 const SMALL_PART: usize = 50;
 
-/// A change as a layer's top rises past lines: of the section's area in square
-/// millimeters, and of volumes in square millimeters times micrometers.
+/// A change as a layer's top rises past lines: of areas in square millimeters, and of volumes in
+/// square millimeters times micrometers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ProfileChange {
+    /// The change of the section's area.
     pub(crate) area: f64,
+    /// The change of the area of all sections up to the top, united or intersected by the part's
+    /// side.
+    pub(crate) outline: f64,
     pub(crate) lost: f64,
     pub(crate) gained: f64,
 }
@@ -30,6 +34,7 @@ pub(crate) struct ProfileChange {
 impl ProfileChange {
     pub(crate) fn add(&mut self, other: Self) {
         self.area += other.area;
+        self.outline += other.outline;
         self.lost += other.lost;
         self.gained += other.gained;
     }
@@ -51,6 +56,8 @@ pub(crate) struct SurfacePiece {
     /// How much of it the section gains once the top is past it: less than 0 if the part
     /// lies below.
     pub(crate) section: f64,
+    /// The same for all sections up to the top, united or intersected.
+    pub(crate) outline: f64,
     /// The heights lost and gained once the top is past its ends.
     pub(crate) lost: [f64; 2],
     pub(crate) gained: [f64; 2],
@@ -85,27 +92,28 @@ impl SurfacePiece {
         [dx * a * d, dx * (a * thickening + rise * d) / 2.0, dx * rise * thickening / 3.0]
     }
 
-    /// Returns what changes the section, what is lost and what is gained, over the share
-    /// passed.
-    fn integrals(&self) -> [Cubic; 3] {
-        [[self.section; 2], self.lost, self.gained].map(|ends| self.integral(ends))
+    /// Returns what changes the section and the outline, what is lost and what is gained, over the
+    /// share passed.
+    fn integrals(&self) -> [Cubic; 4] {
+        [[self.section; 2], [self.outline; 2], self.lost, self.gained]
+            .map(|ends| self.integral(ends))
     }
 
     /// Returns the change once a share of the surface's heights is passed.
     #[inline]
     fn passed(&self, share: f64) -> ProfileChange {
-        let [area, lost, gained] =
+        let [area, outline, lost, gained] =
             self.integrals().map(|[a, b, c]| share * (a + share * (b + share * c)));
-        ProfileChange { area, lost, gained }
+        ProfileChange { area, outline, lost, gained }
     }
 }
 
 /// Coefficients of powers of the top's height, from 1 on.
 type Polynomial = [f64; 4];
 
-/// Polynomials of the section's area, what is lost, and what is gained.
+/// Polynomials of the areas of the section and the outline, what is lost, and what is gained.
 #[derive(Clone, Copy, Debug, Default)]
-struct Polynomials([Polynomial; 3]);
+struct Polynomials([Polynomial; 4]);
 
 impl Polynomials {
     fn of(surface: &SurfacePiece) -> Self {
@@ -124,7 +132,8 @@ impl Polynomials {
     }
 
     fn constant(change: ProfileChange) -> Self {
-        Self([change.area, change.lost, change.gained].map(|value| [value, 0.0, 0.0, 0.0]))
+        let ProfileChange { area, outline, lost, gained } = change;
+        Self([area, outline, lost, gained].map(|value| [value, 0.0, 0.0, 0.0]))
     }
 
     fn add(&mut self, other: &Self, factor: f64) {
@@ -133,8 +142,9 @@ impl Polynomials {
     }
 
     fn at(&self, top: f64) -> ProfileChange {
-        let [area, lost, gained] = self.0.map(|p| p[0] + top * (p[1] + top * (p[2] + top * p[3])));
-        ProfileChange { area, lost, gained }
+        let [area, outline, lost, gained] =
+            self.0.map(|p| p[0] + top * (p[1] + top * (p[2] + top * p[3])));
+        ProfileChange { area, outline, lost, gained }
     }
 }
 
@@ -234,6 +244,7 @@ mod tests {
             extent: section.abs(),
             density,
             section: section.signum(),
+            outline: section.signum().max(0.0),
             lost: [3.0, 40.0],
             gained: [1.5, -0.5],
         };
@@ -261,6 +272,7 @@ mod tests {
                 expected.add(surface.passed(passed));
             }
             assert!((change.area - expected.area).abs() < 1e-12, "{k}");
+            assert!((change.outline - expected.outline).abs() < 1e-12, "{k}");
             assert!((change.lost - expected.lost).abs() < 1e-10, "{k}");
             assert!((change.gained - expected.gained).abs() < 1e-10, "{k}");
         }
@@ -277,6 +289,7 @@ mod tests {
             extent: 2.0,
             density: EVEN,
             section: 1.0,
+            outline: 0.0,
             lost: [0.0; 2],
             gained: [20.0; 2],
         });

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lamp_slicing::{LayerHeights, SliceError};
+use lamp_slicing::{LayerHeights, PLANE_TOLERANCE, SliceError};
 use lamp_stack::Length;
 
 use crate::by_height::ByHeight;
@@ -182,7 +182,8 @@ impl HeightSearch<'_> {
     pub(crate) fn grid(&self) -> Result<StepGrid<'_>, HeightsError> {
         let [bottom_um, top_um] = self.part.heights_um();
         let step_um = self.thicknesses.step().um();
-        let end = ((top_um - bottom_um) / step_um).round().max(1.0);
+        let (height, step) = (Length::from_um(top_um - bottom_um), self.thicknesses.step());
+        let end = self.part.side().whole_layers(height, step, PLANE_TOLERANCE);
         if end / *self.thicknesses.steps().start() as f64 > MAX_LAYERS {
             return Err(too_high([bottom_um, top_um]));
         }

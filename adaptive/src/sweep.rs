@@ -9,8 +9,9 @@
 //! without rows ([`FacetSums`](crate::facets::FacetSums)). So rows need only add how other columns
 //! differ from that.
 
-use lamp_slicing::{FillRule, Position, Turn};
+use lamp_slicing::{FillRule, Position, Side, Turn};
 
+use crate::facets::outline;
 use crate::profile::{ChangeProfile, EVEN, SurfacePiece};
 
 /// A point where the part's surface crosses the layer's bottom in a row.
@@ -57,6 +58,7 @@ pub(crate) enum RowsAdd {
 #[derive(Debug)]
 pub(crate) struct Sweep<'a> {
     rule: &'a FillRule,
+    side: Side,
     pitch_mm: f64,
     adds: RowsAdd,
     ends: Vec<f64>,
@@ -67,8 +69,8 @@ pub(crate) struct Sweep<'a> {
 const MAX_SPLITS: u32 = 12;
 
 impl<'a> Sweep<'a> {
-    pub(crate) fn new(rule: &'a FillRule, pitch_mm: f64, adds: RowsAdd) -> Self {
-        Self { rule, pitch_mm, adds, ends: Vec::new(), open: Vec::new() }
+    pub(crate) fn new(rule: &'a FillRule, side: Side, pitch_mm: f64, adds: RowsAdd) -> Self {
+        Self { rule, side, pitch_mm, adds, ends: Vec::new(), open: Vec::new() }
     }
 
     /// Adds a row, whose toggles and slopes are sorted from the left. Returns false
@@ -213,6 +215,7 @@ impl<'a> Sweep<'a> {
         let mut within = [0.0; 2];
         // The height, up to the line before, that is not as it is just above it.
         let mut unlike = [0.0; 2];
+        let mut is_first = true;
         for slope in &self.open {
             position.cross(slope.turn);
             let heights = columns.map(|x| slope.height(x));
@@ -223,15 +226,25 @@ impl<'a> Sweep<'a> {
                 let sign = if inside { 1.0 } else { -1.0 };
                 within = [within[0] + sign * heights[0], within[1] + sign * heights[1]];
                 let [lost, gained] = if inside { [unlike, before] } else { [before, unlike] };
-                seen = SectionChange { section: -sign, lost, gained };
-                inside = !inside;
+                let outline = if is_first { outline(self.side, !inside) } else { 0.0 };
+                seen = SectionChange { section: -sign, outline, lost, gained };
+                (inside, is_first) = (!inside, false);
             }
             if self.adds == RowsAdd::Differences {
-                seen = seen.without(SectionChange::of_one(slope.turn, heights));
+                seen = seen.without(SectionChange::of_one(self.side, slope.turn, heights));
             }
             if seen != SectionChange::default() {
-                let SectionChange { section, lost, gained } = seen;
-                profile.add(SurfacePiece { heights, extent, density: EVEN, section, lost, gained });
+                let SectionChange { section, outline, lost, gained } = seen;
+                let density = EVEN;
+                profile.add(SurfacePiece {
+                    heights,
+                    extent,
+                    density,
+                    section,
+                    outline,
+                    lost,
+                    gained,
+                });
             }
         }
         profile.add_unavoidable(extent, within, inside);
@@ -246,21 +259,24 @@ fn tells(turn: Turn, position: &mut Position<'_>) -> bool {
     i32::from(position.is_inside()) - i32::from(below) == turn.winding()
 }
 
-/// The change by a line once the top is past it: of the section and, at its two ends, of the
-/// heights lost and gained.
+/// The change by a line once the top is past it: of the section, of all sections together and, at
+/// its two ends, of the heights lost and gained.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct SectionChange {
     section: f64,
+    outline: f64,
     lost: [f64; 2],
     gained: [f64; 2],
 }
 
 impl SectionChange {
     /// Returns the change by a line that no other is above or below.
-    fn of_one(turn: Turn, heights: [f64; 2]) -> Self {
-        match turn.winding() {
-            -1 => Self { section: -1.0, lost: heights, gained: [0.0; 2] },
-            _ => Self { section: 1.0, lost: [0.0; 2], gained: heights },
+    fn of_one(side: Side, turn: Turn, heights: [f64; 2]) -> Self {
+        let enters = turn.winding() != -1;
+        let outline = outline(side, enters);
+        match enters {
+            false => Self { section: -1.0, outline, lost: heights, gained: [0.0; 2] },
+            true => Self { section: 1.0, outline, lost: [0.0; 2], gained: heights },
         }
     }
 
@@ -268,6 +284,7 @@ impl SectionChange {
         let less = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
         Self {
             section: self.section - other.section,
+            outline: self.outline - other.outline,
             lost: less(self.lost, other.lost),
             gained: less(self.gained, other.gained),
         }
@@ -298,13 +315,22 @@ mod tests {
     }
 
     fn changes(fill: Fill, toggles: &[Toggle], slopes: &[SlopeLine]) -> Vec<ProfileChange> {
+        changes_on(Side::Both, fill, toggles, slopes)
+    }
+
+    fn changes_on(
+        side: Side,
+        fill: Fill,
+        toggles: &[Toggle],
+        slopes: &[SlopeLine],
+    ) -> Vec<ProfileChange> {
         let mut profile = ChangeProfile::new(&[10.0, 20.0, 40.0]);
-        Sweep::new(&fill.into(), 1.0, RowsAdd::All).add(toggles, slopes, &mut profile);
+        Sweep::new(&fill.into(), side, 1.0, RowsAdd::All).add(toggles, slopes, &mut profile);
         profile.changes()
     }
 
     fn change(area: f64, lost: f64, gained: f64) -> ProfileChange {
-        ProfileChange { area, lost, gained }
+        ProfileChange { area, lost, gained, ..ProfileChange::default() }
     }
 
     /// A wall that leans in by 1 over 40, and one that leans out.
@@ -331,6 +357,26 @@ mod tests {
                 found,
                 [change(0.0, 0.0, 0.0), change(2.0, 0.0, 24.0), change(0.0, 26.0, 0.0)]
             );
+        }
+    }
+
+    /// A plate over a block that ends at 5: the first surface decides what all sections have.
+    #[test]
+    fn all_sections_together_change_at_the_first_surface() {
+        let toggles = [toggle(0.0, 1), toggle(2.0, -1)];
+        let slopes = [
+            slope([0.0, 2.0], [5.0; 2], -1),
+            slope([0.0, 4.0], [12.0; 2], 1),
+            slope([0.0, 4.0], [25.0; 2], -1),
+        ];
+        for (side, expected) in [
+            (Side::Outside, [0.0, 2.0, 2.0]),
+            (Side::Inside, [-2.0, -2.0, -2.0]),
+            (Side::Both, [0.0; 3]),
+        ] {
+            let found = changes_on(side, Fill::Solid, &toggles, &slopes);
+            let found: Vec<f64> = found.iter().map(|change| change.outline).collect();
+            assert_eq!(found, expected, "{side}");
         }
     }
 

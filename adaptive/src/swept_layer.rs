@@ -1,9 +1,12 @@
 //! Layers as they are built, compared with the part.
 
+use lamp_slicing::{PLANE_TOLERANCE, Side};
+
 use crate::profile::ProfileChange;
 
 /// A layer as it is built, the part's section at its top swept down, compared with
-/// the part between the same heights.
+/// the part between the same heights. On one side of the part ([`Side`]) it is all sections between
+/// these heights, intersected or united, swept alike.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SweptLayer {
     /// The height of its bottom, in micrometers.
@@ -19,7 +22,7 @@ pub struct SweptLayer {
     /// The area of the part's section just above the layer's bottom, in square
     /// millimeters.
     pub bottom_area_mm2: f64,
-    /// The area of its section at the top, which is the layer's.
+    /// The area of its section at the top.
     pub top_area_mm2: f64,
     /// The greatest |N_z| of the unit normals of the facets inside the layer: 0 for
     /// upright walls, 1 for flat faces between bottom and top.
@@ -42,19 +45,29 @@ pub(crate) struct SweptSection {
 impl SweptSection {
     /// Returns the layer that is this section, swept down from the layer's top. Above the section,
     /// where the part has ended, all of the layer is too much.
-    pub(crate) fn swept(&self, bottom_um: f64, thickness_um: f64) -> SweptLayer {
+    pub(crate) fn swept(&self, bottom_um: f64, thickness_um: f64, side: Side) -> SweptLayer {
         let Self { plane_um, bottom_area, change } = *self;
         let top_area = (bottom_area + change.area).max(0.0);
         let (lost, gained) = (change.lost.max(0.0), change.gained.max(0.0));
-        // The last layer may end above the part, whose section is swept up as well.
-        let above = top_area * (thickness_um - plane_um);
+        // The part is the swept section, plus what that lacks, less what it has too much.
+        let volume = (top_area * plane_um + lost - gained).max(0.0);
+        let outline = (bottom_area + change.outline).max(0.0);
+        // The last layer may end above the part.
+        let above_um = thickness_um - plane_um;
+        let [lost, gained] = match side {
+            // The section is swept up as well.
+            Side::Both => [lost, gained + top_area * above_um],
+            // Nothing is inside the part where it has ended.
+            Side::Inside if above_um > PLANE_TOLERANCE.um() => [volume, 0.0],
+            Side::Inside => [(volume - outline * thickness_um).max(0.0), 0.0],
+            Side::Outside => [0.0, (outline * thickness_um - volume).max(0.0)],
+        };
         SweptLayer {
             bottom_um,
             thickness_um,
-            // The part is the swept section, plus what that lacks, less what it has too much.
-            volume_mm3: (top_area * plane_um + lost - gained).max(0.0) / 1000.0,
+            volume_mm3: volume / 1000.0,
             lost_mm3: lost / 1000.0,
-            gained_mm3: (gained + above) / 1000.0,
+            gained_mm3: gained / 1000.0,
             bottom_area_mm2: bottom_area,
             top_area_mm2: top_area,
             ..SweptLayer::default()

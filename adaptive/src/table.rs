@@ -5,7 +5,7 @@
 //! do not overlap, the sum is a bound: a search by the table alone may miss a layer, but takes none
 //! that is worse than the table gives.
 
-use lamp_slicing::PlacedFacet;
+use lamp_slicing::{PlacedFacet, Side};
 
 use crate::facets::area_from_above;
 use crate::layered_part::{LayeredPart, cosine_to_vertical};
@@ -67,6 +67,7 @@ pub(crate) struct HeightTable {
     bottom_um: f64,
     top_um: f64,
     step_um: f64,
+    side: Side,
     steps: Vec<HeightStep>,
 }
 
@@ -81,7 +82,7 @@ impl HeightTable {
     pub(crate) fn new(part: &LayeredPart, step_um: f64, count: usize) -> Option<Self> {
         let [bottom_um, top_um] = part.heights_um();
         let steps = vec![HeightStep::default(); count + 1];
-        let table = Self { bottom_um, top_um, step_um, steps };
+        let table = Self { bottom_um, top_um, step_um, side: part.side(), steps };
         let mut filling = Filling { table, steepest: RangeMax::new(count + 1) };
         let (mut sum, mut all) = (0.0, 0.0);
         part.facets().for_each(|facet, _| {
@@ -112,7 +113,7 @@ impl HeightTable {
         thicknesses: &'a [usize],
     ) -> impl Iterator<Item = SweptLayer> + 'a {
         self.sections(bottom, thicknesses).map(move |(thickness_um, section, steepest)| {
-            let layer = section.swept(self.at(bottom), thickness_um);
+            let layer = section.swept(self.at(bottom), thickness_um, self.side);
             SweptLayer { steepest, ..layer }
         })
     }
@@ -148,7 +149,12 @@ impl HeightTable {
             let top_um = self.at(top);
             let plane_um = top_um.min(self.top_um.max(bottom_um)) - bottom_um;
             let (lost, gained) = (up.moment, down.moment);
-            let change = ProfileChange { area: down.area - up.area, lost, gained };
+            let outline = match self.side {
+                Side::Both => 0.0,
+                Side::Inside => -up.area,
+                Side::Outside => down.area,
+            };
+            let change = ProfileChange { area: down.area - up.area, outline, lost, gained };
             (top_um - bottom_um, SweptSection { plane_um, bottom_area, change }, steepest)
         })
     }

@@ -1,5 +1,6 @@
 //! Layers of one thickness, to compare with.
 
+use lamp_slicing::PLANE_TOLERANCE;
 use lamp_stack::Length;
 
 use crate::error::HeightsError;
@@ -14,7 +15,8 @@ use crate::table::HeightTable;
 pub fn uniform_heights(part: &LayeredPart, thickness: Length) -> Result<Heights, HeightsError> {
     let [bottom_um, top_um] = part.heights_um();
     let thickness_um = thickness.um();
-    let count = ((top_um - bottom_um) / thickness_um).round().max(1.0);
+    let height = Length::from_um(top_um - bottom_um);
+    let count = part.side().whole_layers(height, thickness, PLANE_TOLERANCE);
     // Negated, so that a thickness of NaN fails, too.
     if !(thickness_um > 0.0 && count <= MAX_LAYERS) {
         return Err(too_high([bottom_um, top_um]));

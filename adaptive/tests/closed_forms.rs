@@ -5,10 +5,10 @@ use std::f64::consts::PI;
 
 use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, HeightSearch, LayeredPart, SweptLayer, Thicknesses,
-    VolumeDeviation, Watch,
+    VolumeDeviation, Watch, uniform_heights,
 };
 use lamp_fixtures::{Mesh, cone, sphere};
-use lamp_slicing::{FacetIndex, Fill, Part, Placement, Units};
+use lamp_slicing::{FacetIndex, Fill, Part, Placement, Side, Units};
 use lamp_stack::Length;
 
 fn part(mesh: &Mesh) -> LayeredPart {
@@ -190,5 +190,63 @@ fn layers_within_a_bound_are_truly_within_it() {
             count += 1;
         }
         assert!(count > 20, "{count}");
+    }
+}
+
+/// Figure 38: a sphere of 14,137 mm3 in layers of half a millimeter, around it and inside. Sections
+/// are widest and narrowest at ends of layers.
+#[test]
+fn a_sphere_is_contained_or_contains() {
+    let (radius, t) = (15.0, 0.5);
+    let section = |k: i32| PI * (radius * radius - (f64::from(k) * t - radius).powi(2));
+    let sum = |pick: fn(f64, f64) -> f64| {
+        (0..60).map(|k| t * pick(section(k), section(k + 1))).sum::<f64>()
+    };
+    let [inside, outside] = [sum(f64::min), sum(f64::max)];
+    assert!((outside - 14_475.0).abs() < 15.0 && (inside - 13_768.0).abs() < 15.0);
+    for (side, expected) in [(Side::Inside, inside), (Side::Outside, outside)] {
+        let part = along_rows(&sphere(radius, 200_000), 50.0).on_side(side);
+        let heights = uniform_heights(&part, Length::from_mm(t)).unwrap();
+        let [lost, gained, volume] = heights.volumes_mm3();
+        assert_eq!(heights.layers.len(), 60);
+        assert!((volume / 14_137.167 - 1.0).abs() < 1e-4, "{volume}");
+        let built = volume - lost + gained;
+        assert!((built / expected - 1.0).abs() < 1e-4, "{side}: {built} for {expected}");
+        assert_eq!(if side == Side::Inside { gained } else { lost }, 0.0);
+    }
+}
+
+/// Layers on one side keep a bound of their own.
+#[test]
+fn layers_on_one_side_are_within_their_bound() {
+    let [min, max, step] = [25.0, 400.0, 1.0].map(Length::from_um);
+    let thicknesses = Thicknesses::new(min, max, step).unwrap();
+    let radius = |z: f64| 3.0 - 2.9 * z / 4.0;
+    let layers = |side: Side| {
+        let part = along_rows(&cone(3.0, 0.1, 4.0, 40_000), 50.0).on_side(side);
+        let search = HeightSearch {
+            part: &part,
+            thicknesses: &thicknesses,
+            criterion: &VolumeDeviation,
+            snap: false,
+            watch: Watch::default(),
+        };
+        search.heights(0.02).unwrap().layers
+    };
+    let area = |z: f64| PI * radius(z).powi(2);
+    for side in [Side::Inside, Side::Outside] {
+        let layers = layers(side);
+        for layer in &layers {
+            let [bottom, top] = [layer.bottom_um, layer.top_um()].map(|um| um / 1000.0);
+            let [_, _, volume] = discs(bottom, top, radius);
+            // The cone narrows: its widest section is at the bottom.
+            let built =
+                (top - bottom) * if side == Side::Inside { area(top) } else { area(bottom) };
+            let [lost, gained] = [(volume - built).max(0.0), (built - volume).max(0.0)];
+            check(layer, [lost, gained, volume]);
+            // Next to the top, little room is left for layers.
+            let is_free = layer.thickness_um > 25.5 && bottom < 3.9;
+            assert!((lost + gained) / volume < 0.020_02 || !is_free, "{layer:?}");
+        }
     }
 }

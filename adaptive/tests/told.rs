@@ -5,7 +5,7 @@ use lamp_adaptive::{
     uniform_heights,
 };
 use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus, tower};
-use lamp_slicing::{Axis, FacetIndex, Fill, Part, Placement, Units};
+use lamp_slicing::{Axis, FacetIndex, Fill, Part, Placement, Side, Units};
 use lamp_stack::Length;
 
 fn part(mesh: &Mesh, placement: &Placement, fill: Fill) -> LayeredPart {
@@ -56,22 +56,25 @@ fn facets_and_few_rows_tell_what_all_rows_do() {
         ("open tower", open, upright),
     ] {
         for fill in [Fill::EvenOdd, Fill::Solid] {
-            let part = part(&mesh, &placement, fill);
-            for [min, max, step] in [[25.0, 100.0, 1.0], [200.0, 1000.0, 40.0]] {
-                let [min, max, step] = [min, max, step].map(Length::from_um);
-                let thicknesses = Thicknesses::new(min, max, step).unwrap();
-                let search = HeightSearch {
-                    part: &part,
-                    thicknesses: &thicknesses,
-                    criterion: &VolumeDeviation,
-                    snap: false,
-                    watch: Watch::default(),
-                };
-                let what = format!("{name}, {fill:?}, {min}");
-                check(&part, &search.heights(0.03).unwrap(), &what);
-                let search = HeightSearch { criterion: &CuspHeight, ..search };
-                check(&part, &search.heights(0.3 * max.um()).unwrap(), &what);
-                check(&part, &uniform_heights(&part, max).unwrap(), &what);
+            // Each side once, in turn.
+            let side = if fill == Fill::Solid { Side::Outside } else { Side::Inside };
+            for part in [Side::Both, side].map(|side| part(&mesh, &placement, fill).on_side(side)) {
+                for [min, max, step] in [[25.0, 100.0, 1.0], [200.0, 1000.0, 40.0]] {
+                    let [min, max, step] = [min, max, step].map(Length::from_um);
+                    let thicknesses = Thicknesses::new(min, max, step).unwrap();
+                    let search = HeightSearch {
+                        part: &part,
+                        thicknesses: &thicknesses,
+                        criterion: &VolumeDeviation,
+                        snap: false,
+                        watch: Watch::default(),
+                    };
+                    let what = format!("{name}, {fill:?}, {min}");
+                    check(&part, &search.heights(0.03).unwrap(), &what);
+                    let search = HeightSearch { criterion: &CuspHeight, ..search };
+                    check(&part, &search.heights(0.3 * max.um()).unwrap(), &what);
+                    check(&part, &uniform_heights(&part, max).unwrap(), &what);
+                }
             }
         }
     }

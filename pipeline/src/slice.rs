@@ -176,7 +176,7 @@ impl SliceSettings {
         // Layers are as thick as their heights say, or all the same.
         let thickness = self.uniform_thickness().unwrap_or_default();
         Ok(match self.gray {
-            GrayRule::None => Shading::White,
+            GrayRule::None => self.side.into(),
             GrayRule::ByDepth => {
                 let levels = |um| known()?.levels(um).map_err(Error::from);
                 Shading::ByDepth(match heights {
@@ -213,7 +213,7 @@ impl SliceSettings {
             Thickness::OfPart {} => return Ok(model.stated_layers(&self.solid.placement())?),
         };
         let body = self.solid.body(model.clone())?;
-        let part = settings.part(body, self.pitch, self.solid.fill)?;
+        let part = settings.part(body, self.pitch, self.solid.fill)?.on_side(self.side);
         let found = settings.find(&part, exposure, watcher)?;
         let notes = heights::doubts(&found, exposure);
         notes.into_iter().for_each(|note| watcher.remark(Remark::note(note)));

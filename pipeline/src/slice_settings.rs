@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use lamp_build::TurnedSlicing;
 use lamp_machine::{Defaults, Machine, MachineLimit};
-use lamp_slicing::{Axis, GridRule, PLANE_TOLERANCE, Part, PlaneRule, SliceOptions};
+use lamp_slicing::{Axis, GridRule, PLANE_TOLERANCE, Part, PlaneRule, Side, SliceOptions};
 use lamp_stack::{Length, Pitch, Size, StackInfo, quoted};
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +35,9 @@ pub struct SliceSettings {
     /// The largest distance of a vertex from a layer's plane at which it still counts as on it.
     #[serde(with = "text", skip_serializing_if = "is_usual_tolerance")]
     pub plane_tolerance: Length,
+    /// The side of the part on which layers lie.
+    #[serde(with = "text", skip_serializing_if = "is_default")]
+    pub side: Side,
     /// The solid.
     #[serde(flatten)]
     pub solid: SolidSettings,
@@ -65,7 +68,7 @@ pub enum Thickness {
         adaptive: bool,
         /// The limits, and the largest error.
         #[serde(flatten)]
-        heights: HeightSettings,
+        heights: Box<HeightSettings>,
     },
     /// All the same.
     Uniform {
@@ -154,6 +157,7 @@ impl Default for SliceSettings {
             thickness: Thickness::OfPart {},
             plane: PlaneRule::default(),
             plane_tolerance: PLANE_TOLERANCE,
+            side: Side::Both,
             solid: SolidSettings::default(),
             no_polish: false,
             gray: GrayRule::default(),
@@ -174,6 +178,7 @@ impl SliceSettings {
             thickness: self.uniform_thickness().unwrap_or(usual.thickness),
             plane: self.plane,
             plane_tolerance: self.plane_tolerance,
+            shading: self.side.into(),
             units: self.solid.units,
             placement: self.solid.placement(),
             fill: self.solid.fill,
@@ -335,7 +340,18 @@ impl SliceSettings {
             Thickness::Adaptive { heights, .. } => Some(heights),
             Thickness::Uniform { .. } | Thickness::OfPart {} => None,
         };
-        let needs_top = [(is_gray, "--gray"), (heights.is_some(), "--adaptive")];
+        let side = self.side;
+        let has_side = side != Side::Both;
+        // Gray levels change what a layer cures, and gray edges are no side.
+        if let Some((_, option)) =
+            [(is_gray, "--gray"), (self.antialias, "--antialias")].iter().find(|(given, _)| *given)
+            && has_side
+        {
+            let why = format!("--side {side} decides all pixels of a layer: leave out {option}");
+            return Err(Error::settings(why));
+        }
+        let needs_top =
+            [(is_gray, "--gray"), (heights.is_some(), "--adaptive"), (has_side, "--side")];
         if let Some((_, option)) = needs_top.iter().find(|(given, _)| *given)
             && self.plane != PlaneRule::Top
         {

@@ -35,6 +35,7 @@ def slice(
     layers: Optional[range] = None,
     plane: Optional[Literal["top", "middle", "bottom"]] = None,
     plane_tolerance: Optional[str] = None,
+    side: Optional[Literal["both", "inside", "outside"]] = None,
     units: Optional[Literal["mm", "cm", "m", "um", "inch", "ft"]] = None,
     fill: Optional[Literal["solid", "even-odd"]] = None,
     bodies: Optional[Literal["unite", "xor"]] = None,
@@ -89,6 +90,7 @@ def slice(
     machine: "alpha", "beta" or a file: its limits and defaults hold.
     layers: only these layers, such as range(100, 200).
     plane, plane_tolerance: where in a layer the part is cut, and what counts as on the plane.
+    side: whether layers lie inside the part, outside of it, or on both sides of its surface.
     units, fill, bodies, subtract, intersect, trust_extent: the solid.
     scale, mirror, rotate, translate: its place, in this order: rotate=["x:90", "z:-12.5"],
         translate=(0, 0, 5) in millimeters.
@@ -107,6 +109,7 @@ def slice(
         "thickness": thickness,
         "plane": plane,
         "plane_tolerance": plane_tolerance,
+        "side": side,
         "units": units,
         "fill": fill,
         "bodies": bodies,

@@ -217,6 +217,7 @@ mod tests {
 
     use super::*;
     use crate::facet::Units;
+    use crate::gray::Side;
     use crate::part::Part;
     use crate::placement::Placement;
     use crate::planes::{PLANE_TOLERANCE, PlaneRule};
@@ -239,7 +240,9 @@ mod tests {
         let survey = FacetSurvey::of(&model).unwrap();
         let thickness = Length::from_um(50.0);
         let part_um = [0.0, 10_000.0];
-        let planes = Planes::uniform(part_um, thickness, PlaneRule::Top, PLANE_TOLERANCE).unwrap();
+        let planes =
+            Planes::uniform(part_um, thickness, PlaneRule::Top, PLANE_TOLERANCE, Side::Both);
+        let planes = planes.unwrap();
         // Slabs of one layer and of many, not all of the part.
         let slabs = [3..4, 4..5, 5..60, 60..150, 150..190];
         for memory in [0, 1 << 24] {

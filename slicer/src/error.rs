@@ -243,6 +243,9 @@ pub enum SliceError {
          their tops"
     )]
     GrayPlane,
+    /// Layers on one side of the part were to have gray edges.
+    #[error("layers inside or outside of the part have no gray edges: a pixel is white or black")]
+    GraySide,
     /// A STEP file could not be read, or no facets could be made of it.
     #[error(transparent)]
     Brep(#[from] BrepError),

@@ -100,7 +100,7 @@ pub use exact::Polished;
 pub use facet::{Facet, PlacedFacet, Units, facet_heights};
 pub use facet_index::FacetIndex;
 pub use fill::Fill;
-pub use gray::{LayerLevels, Shading};
+pub use gray::{LayerLevels, Shading, Side};
 pub use grid::PixelGrid;
 pub use named_surface::{SurfaceError, SurfaceName, SurfaceNames};
 #[cfg(feature = "occt")]

@@ -7,6 +7,7 @@ use std::ops::Range;
 use lamp_stack::{Grouped, Length};
 
 use crate::error::SliceError;
+use crate::gray::Side;
 use crate::scan::count_at_or_below;
 
 /// A limit above the number of layers that any machine builds.
@@ -121,7 +122,7 @@ impl Spacing {
 }
 
 impl Planes {
-    /// Creates the planes of a part between two heights (micrometers).
+    /// Creates the planes of a part between two heights (micrometers), for layers on a side of it.
     ///
     /// # Errors
     /// Returns an error if there would be more layers than any machine builds.
@@ -130,10 +131,12 @@ impl Planes {
         thickness: Length,
         rule: PlaneRule,
         tolerance: Length,
+        side: Side,
     ) -> Result<Self, SliceError> {
         let thickness_um = thickness.um();
         // A part thinner than half a layer still gets one.
-        let count = ((top_um - bottom_um) / thickness_um).round().max(1.0);
+        let height = Length::from_um(top_um - bottom_um);
+        let count = side.whole_layers(height, thickness, tolerance);
         // Negated, so that a thickness of NaN also fails.
         if !(thickness_um > 0.0 && count < MAX_LAYERS) {
             let height = Length::from_um(top_um - bottom_um).to_whole_nm();
@@ -354,6 +357,13 @@ impl Planes {
         self.z_um.len()
     }
 
+    /// Returns the depth below a layer's top, in micrometers, from which on a face counts as lying at
+    /// its bottom.
+    pub(crate) fn bottom_depth_um(&self, layer: usize) -> f64 {
+        let thickness_um = self.thickness_um(layer);
+        thickness_um - self.tolerance_um.min(0.5 * thickness_um)
+    }
+
     /// Returns the height of a plane, in micrometers.
     #[inline]
     pub(crate) fn z_um(&self, layer: usize) -> f64 {
@@ -509,7 +519,8 @@ mod tests {
     use super::*;
 
     fn uniform(height_um: f64, thickness_um: f64, rule: PlaneRule) -> Result<Planes, SliceError> {
-        Planes::uniform([0.0, height_um], Length::from_um(thickness_um), rule, PLANE_TOLERANCE)
+        let thickness = Length::from_um(thickness_um);
+        Planes::uniform([0.0, height_um], thickness, rule, PLANE_TOLERANCE, Side::Both)
     }
 
     fn planes(height_um: f64, rule: PlaneRule) -> Vec<f64> {
@@ -566,7 +577,8 @@ mod tests {
             for rule in [PlaneRule::Top, PlaneRule::Middle, PlaneRule::Bottom] {
                 let thickness = Length::from_um(33.1);
                 let part_um = [0.3, top_um];
-                let uniform = Planes::uniform(part_um, thickness, rule, PLANE_TOLERANCE).unwrap();
+                let uniform =
+                    Planes::uniform(part_um, thickness, rule, PLANE_TOLERANCE, Side::Both).unwrap();
                 let given = Planes::of(&heights, part_um, rule, PLANE_TOLERANCE);
                 assert_eq!(given.boundaries_um, uniform.boundaries_um, "{top_um}");
                 for (a, b) in given.z_um.iter().zip(&uniform.z_um) {

@@ -19,7 +19,9 @@ use crate::error::SliceError;
 use crate::exact::{PlacedSurfaces, Polished};
 use crate::facet::{PlacedFacet, Units};
 use crate::fill::Fill;
-use crate::gray::{Columns, DepthRows, DepthSpan, Edge, PlacedShading, PrintThrough, Shading};
+use crate::gray::{
+    Columns, DepthRows, DepthSpan, Edge, PlacedShading, PrintThrough, Shading, Side,
+};
 use crate::grid::PixelGrid;
 use crate::part::Part;
 use crate::placed_part::PlacedPart;
@@ -48,11 +50,12 @@ pub struct SliceOptions {
     pub placement: Placement,
     /// The rule that decides what is inside.
     pub fill: Fill,
-    /// The gray of layers where the part is less deep. The plane must then be
-    /// [`PlaneRule::Top`].
+    /// The gray of layers where the part is less deep, or their side of the part. The plane must
+    /// then be [`PlaneRule::Top`].
     pub shading: Shading,
     /// Makes edges gray: the level of a pixel is the share of its area within the section, times its
-    /// level by [`shading`](Self::shading). Not where doses add up.
+    /// level by [`shading`](Self::shading). Not where doses add up, nor on
+    /// one side of the part.
     pub antialias: bool,
     /// Moves crossings of B-rep parts from facets onto the exact surfaces.
     pub polish: bool,
@@ -194,9 +197,12 @@ impl Slices {
     }
 
     fn prepared(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
-        let by_depth = options.shading != Shading::White;
+        let (by_depth, side) = (options.shading != Shading::White, options.shading.side());
         if by_depth && options.plane != PlaneRule::Top {
             return Err(SliceError::GrayPlane);
+        }
+        if side != Side::Both && options.antialias {
+            return Err(SliceError::GraySide);
         }
         let model = PlacedPart::new(model, &options.placement, options.units);
         let survey = FacetSurvey::of(&model)?;
@@ -216,12 +222,13 @@ impl Slices {
             Some(heights) => Planes::of(heights, part_um, options.plane, options.plane_tolerance),
             None => {
                 let SliceOptions { thickness, plane, plane_tolerance, .. } = *options;
-                Planes::uniform(part_um, thickness, plane, plane_tolerance)?
+                Planes::uniform(part_um, thickness, plane, plane_tolerance, side)?
             }
         };
         let planes = match model.model.pieces() {
-            // The only body's ends are the part's.
+            // The only body's ends are the part's. Of all sections in a layer, none is a body's own.
             [_] => planes,
+            _ if side != Side::Both => planes,
             _ => planes.with_bodies(&survey.heights_of_bodies(&model)),
         };
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
@@ -360,10 +367,10 @@ impl Slices {
 
     /// Returns whether layers are gray.
     pub fn is_gray(&self) -> bool {
-        self.antialias || !matches!(self.shading, PlacedShading::White)
+        self.antialias || !self.shading.is_one_bit()
     }
 
-    /// Returns the gray of the layers.
+    /// Returns the gray of the layers, or their side of the part.
     pub fn shading(&self) -> Shading {
         self.shading.unplaced()
     }

@@ -8,7 +8,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use lamp_stack::{Grouped, Image, KeyCounts};
+use lamp_stack::{Grouped, Image, KeyCounts, Mask};
 use rayon::prelude::*;
 
 use crate::bodies::{LayerDoubts, Position, SharedCounts, SharedPixels};
@@ -18,7 +18,9 @@ use crate::cutter::Cutter;
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, SolverTally, settle};
 use crate::facet::PlacedFacet;
 use crate::fill::Fill;
-use crate::gray::{DepthRows, DepthSpan, LevelRows, PlacedShading, ShadedRows, Shader, covered};
+use crate::gray::{
+    DepthRows, DepthSpan, LevelRows, PlacedShading, ShadedRows, Shader, SideRows, covered,
+};
 use crate::grid::PixelGrid;
 use crate::image_rows::{MaskRows, RowMaker, by_body, even_odd, make_rows, solid, sort_by};
 use crate::layer_share::LayerShare;
@@ -253,6 +255,25 @@ impl Table {
                 let shader = shader(rows, layer, cutter, &spans);
                 let (rows, cut) = self.rows(layer, cutter, surfaces, shader);
                 (rows.finish(), cut)
+            }
+            PlacedShading::Inside { .. } => {
+                let planes = cutter.planes;
+                let rows = SideRows::<false>::new(width, planes.bottom_depth_um(layer));
+                let shader = shader(rows, layer, cutter, &spans);
+                let (rows, cut) = self.rows(layer, cutter, surfaces, shader);
+                // Nothing fills a layer that reaches above the part.
+                let gap_um = planes.top_um(layer) - planes.z_um(layer);
+                let mask = match gap_um > planes.tolerance_um() {
+                    true => Mask::black(width, cutter.grid.height),
+                    false => rows.finish(),
+                };
+                (Image::Mask(mask), cut)
+            }
+            PlacedShading::Outside { .. } => {
+                let rows = SideRows::<true>::new(width, cutter.planes.bottom_depth_um(layer));
+                let shader = shader(rows, layer, cutter, &spans);
+                let (rows, cut) = self.rows(layer, cutter, surfaces, shader);
+                (Image::Mask(rows.finish()), cut)
             }
             PlacedShading::PrintThrough(_) => {
                 let shader = shader(DepthRows::new(width), layer, cutter, &spans);

@@ -1,7 +1,9 @@
 //! Checks the adaptive layers of `slice --adaptive` and `lamp heights`.
 
+use std::f64::consts::PI;
+
 use lamp_fixtures::{Mesh, Sample, cone};
-use lamp_stack::{Image, Layer};
+use lamp_stack::{Image, Layer, Mask};
 use lamp_tests::{Scratch, masks};
 
 /// Layers of 100 um to 2.5 mm.
@@ -108,6 +110,71 @@ fn ranges_of_height_have_their_own_bounds() {
         ("2%@2", "`2` is not a range of height"),
     ] {
         let ran = scratch.run(&format!("lamp heights cone.stl --deviation {wrong}"));
+        assert!(ran.statuses == [Some(2)] && ran.stderr.contains(why), "{ran:?}");
+    }
+}
+
+/// Returns the volume of a stack's white pixels in cubic millimeters.
+fn volume(layers: &[Layer]) -> f64 {
+    let of_layer = |(layer, mask): (&Layer, &Mask)| {
+        let [x, y] = layer.pitch.unwrap().mm();
+        mask.white_pixels() as f64 * x * y * layer.info.thickness_um.unwrap() / 1000.0
+    };
+    layers.iter().zip(masks(layers)).map(of_layer).sum()
+}
+
+/// Figure 38: sections of a sphere of 14,137 mm3 are widest and narrowest at ends of layers.
+#[test]
+fn stacks_contain_a_sphere_or_lie_inside() {
+    let scratch = Scratch::new();
+    scratch.part("sphere.stl", Sample::Sphere, 100_000);
+    let slice = "slice sphere.stl --dpi 200 --thickness 0.5mm";
+    let of = |side: &str| {
+        scratch.run(&format!("{slice} --side {side} -o {side}.tif")).succeeds_quietly();
+        scratch.layers(&format!("{side}.tif"))
+    };
+    let [inside, both, outside] = ["inside", "both", "outside"].map(of);
+    let section = |k: i32| PI * (225.0 - (f64::from(k) * 0.5 - 15.0).powi(2));
+    let sum = |pick: fn(f64, f64) -> f64| {
+        (0..60).map(|k| 0.5 * pick(section(k), section(k + 1))).sum::<f64>()
+    };
+    for (layers, expected) in [(&inside, sum(f64::min)), (&outside, sum(f64::max))] {
+        let volume = volume(layers);
+        assert!((volume / expected - 1.0).abs() < 1e-3, "{volume} for {expected}");
+    }
+    for (k, [i, b]) in masks(&inside).iter().zip(masks(&both)).map(|(i, b)| [*i, b]).enumerate() {
+        let o = masks(&outside)[k];
+        let all = || (0..b.height()).flat_map(|r| (0..b.width()).map(move |c| [c, r]));
+        assert!(all().all(|[c, r]| i.is_white(c, r) <= b.is_white(c, r)), "{k}");
+        assert!(all().all(|[c, r]| b.is_white(c, r) <= o.is_white(c, r)), "{k}");
+    }
+    let command = &outside[0].info.stack.as_ref().unwrap().commands[0];
+    assert!(command.contains(" --side outside"), "{command}");
+    assert!(scratch.run(command).succeeds().stdout == scratch.bytes("outside.tif"));
+
+    // The report has the volume that the images have, and its layers.
+    let adaptive = "--min 100um --max 1mm --step 10um --deviation 2%";
+    for side in ["inside", "outside"] {
+        let line = format!("lamp heights sphere.stl --side {side} {adaptive} --csv heights.csv");
+        scratch.run(&line).succeeds();
+        let rows = report(&scratch, "heights.csv");
+        let slice = format!("slice sphere.stl --dpi 200 --side {side} --adaptive {adaptive}");
+        scratch.run(&format!("{slice} -o {side}.tif")).succeeds_quietly();
+        let layers = scratch.layers(&format!("{side}.tif"));
+        assert!(rows.iter().map(|row| [row[1], row[2]]).eq(heights_of(&layers)), "{side}");
+        let built: f64 = rows.iter().map(|row| row[3] - row[4] + row[5]).sum();
+        let found = volume(&layers);
+        assert!((found / built - 1.0).abs() < 1e-3, "{side}: {found} for {built}");
+        let none = if side == "inside" { 5 } else { 4 };
+        assert!(rows.iter().all(|row| row[none] == 0.0), "{side}");
+    }
+    for (options, why) in [
+        ("--side inside --plane middle", "--side cuts layers at their tops: leave out --plane"),
+        ("--side inside --antialias", "decides all pixels of a layer: leave out --antialias"),
+        ("--side outside --gray --material lamp-suspension", "leave out --gray"),
+        ("--side top", "possible values: both, inside, outside"),
+    ] {
+        let ran = scratch.run(&format!("slice sphere.stl {options} -o x.tif"));
         assert!(ran.statuses == [Some(2)] && ran.stderr.contains(why), "{ran:?}");
     }
 }

@@ -10,7 +10,7 @@ use lamp_pipeline::placement::FiniteNumbers;
 use lamp_pipeline::slice::SliceStage;
 use lamp_pipeline::words::differing;
 use lamp_pipeline::{GrayRule, SliceFrame, SliceSettings, Thickness};
-use lamp_slicing::{PLANE_TOLERANCE, PlaneRule};
+use lamp_slicing::{PLANE_TOLERANCE, PlaneRule, Side};
 use lamp_stack::{Length, Pitch, Size};
 
 use super::exposure::{EXPOSURE, ExposureArgs};
@@ -46,6 +46,13 @@ pub(crate) struct SlicingArgs {
     /// by a layer. 0um compares heights exactly
     #[arg(long, value_name = "LENGTH", default_value_t = PLANE_TOLERANCE)]
     plane_tolerance: Length,
+
+    /// Side of the part's surface on which layers lie
+    ///
+    /// inside: pixels are white where the part fills the layer from bottom to top. outside: where the
+    /// part is anywhere in the layer, so that the stack contains the part
+    #[arg(long, value_parser = one_of::<Side>(), default_value_t)]
+    side: Side,
 
     #[command(flatten)]
     solid: SolidArgs,
@@ -154,7 +161,7 @@ impl TryFrom<&SlicingArgs> for SliceSettings {
     /// # Errors
     /// Returns an error if an option of adaptive heights is given without these.
     fn try_from(args: &SlicingArgs) -> Result<Self, Exit> {
-        let heights = (&args.heights).into();
+        let heights: HeightSettings = (&args.heights).into();
         if !args.adaptive
             && let Some(option) = differing(&heights, &HeightSettings::default())
         {
@@ -163,12 +170,13 @@ impl TryFrom<&SlicingArgs> for SliceSettings {
         Ok(Self {
             pitch: args.dpi,
             thickness: match (args.adaptive, args.thickness) {
-                (true, _) => Thickness::Adaptive { adaptive: true, heights },
+                (true, _) => Thickness::Adaptive { adaptive: true, heights: heights.into() },
                 (false, Some(thickness)) => Thickness::Uniform { thickness },
                 (false, None) => Thickness::OfPart {},
             },
             plane: args.plane,
             plane_tolerance: args.plane_tolerance,
+            side: args.side,
             solid: (&args.solid).into(),
             no_polish: args.no_polish,
             gray: match (args.gray, args.print_through) {

@@ -15,12 +15,13 @@ use lamp_pipeline::heights::{HeightSettings, bound, doubts, measured, significan
 use lamp_pipeline::part_file::{PartFile, paths};
 use lamp_pipeline::solid::SolidSettings;
 use lamp_pipeline::solid::{Reading, at_part, name_of_all};
+use lamp_slicing::Side;
 use lamp_stack::{Length, Pitch};
 use serde::Serialize;
 
 use crate::args::exposure::ExposureArgs;
 use crate::args::heights::HeightArgs;
-use crate::args::options::{Common, parse_thickness};
+use crate::args::options::{Common, one_of, parse_thickness};
 use crate::args::solid::SolidArgs;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
@@ -71,6 +72,10 @@ pub(crate) struct HeightsArgs {
     #[arg(value_parser = Pitch::stated)]
     dpi: Pitch,
 
+    /// Side of the part's surface on which layers lie, as for `slice`
+    #[arg(long, value_parser = one_of::<Side>(), default_value_t)]
+    side: Side,
+
     #[command(flatten)]
     solid: SolidArgs,
 
@@ -106,7 +111,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let size = solid.size(&model, box_mm);
     let overlap = solid.overlap_doubt(&files, body.overlap());
     size.doubt(args.dpi, None).iter().chain(&overlap).for_each(|doubt| progress.say(doubt));
-    let part = settings.part(body, args.dpi, solid.fill)?;
+    let part = settings.part(body, args.dpi, solid.fill)?.on_side(args.side);
     let found = settings.find(&part, exposure, &progress);
     let found = found.map_err(|error| at_part(error, &files))?;
     let uniform = args.uniform(settings.max(), &part).map_err(|error| at_part(error, &files))?;

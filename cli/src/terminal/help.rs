@@ -168,7 +168,10 @@ const USUAL: [(&str, &[&str]); 14] = [
 
 /// The headings of options of `slice` that have none of their own.
 const SLICE_HEADINGS: [(&str, &[&str]); 3] = [
-    ("Images", &["dpi", "thickness", "plane", "margin", "origin", "size", "machine", "layers"]),
+    (
+        "Images",
+        &["dpi", "thickness", "plane", "side", "margin", "origin", "size", "machine", "layers"],
+    ),
     ("Part", &["units", "fill", "trust_extent"]),
     (
         "Output and memory",

@@ -113,6 +113,7 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::TooLarge { .. } => "check --units and --dpi",
         SliceError::OutsideFrame { .. } => "move or enlarge the frame with --origin and --size",
         SliceError::TooManyLayers { .. } => "check --units and --thickness",
+        SliceError::GraySide => "leave out --antialias or --side",
         SliceError::GrayPlane => "slice them with --plane top",
         SliceError::Faulty { .. } => {
             return Some(format!(

@@ -14,6 +14,9 @@
 //! Where only edges are gray ([`coverage`](self::coverage)), levels are shares of pixels' areas, and
 //! facets below do not count.
 //!
+//! Where the stack is to lie inside the part, or to contain it, no pixel is gray: it is white if its
+//! vertical line is inside the part all the way through the layer, or anywhere in it.
+//!
 //! Where doses add up ([`print_through`](self::print_through)), rows keep the depths instead, and
 //! levels are chosen down columns ([`columns`](self::columns)).
 //!
@@ -41,8 +44,8 @@ pub(crate) use coverage::{Edge, covered};
 pub(crate) use depth_span::DepthSpan;
 pub use levels::LayerLevels;
 pub(crate) use print_through::PrintThrough;
-pub(crate) use rows::{DepthRows, LevelRows, ShadedRows};
+pub(crate) use rows::{DepthRows, LevelRows, ShadedRows, SideRows};
 pub(crate) use shade::Shader;
 pub(crate) use shading::PlacedShading;
-pub use shading::Shading;
+pub use shading::{Shading, Side};
 pub(crate) use sheet::Sheet;

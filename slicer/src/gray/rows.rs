@@ -9,16 +9,20 @@ use super::row_lists::RowLists;
 /// Rows that get the depth of the part below each pixel.
 pub(crate) trait ShadedRows {
     /// The value of a pixel.
-    type Pixel: Copy + PartialEq;
+    /// A row begins with the default.
+    type Pixel: Copy + PartialEq + Default;
     /// A column from which on pixels have another value.
     type Change;
 
-    /// A pixel outside the part.
-    const OUTSIDE: Self::Pixel;
-    /// A pixel below which the part is deeper than any depth that matters.
+    /// Whether the rows look down from pixels outside the section, to where the part begins below,
+    /// and not from pixels inside, to where it ends.
+    const LOOKS_FROM_OUTSIDE: bool = false;
+    /// A pixel from which the rows do not look down.
+    const OTHER: Self::Pixel;
+    /// A pixel below which nothing changes down to any depth that matters.
     const DEEP: Self::Pixel;
 
-    /// Returns the pixel for a depth of part below it, in micrometers.
+    /// Returns the pixel for the depth below it at which the part ends or begins, in micrometers.
     fn of_depth(&self, depth_um: f64) -> Self::Pixel;
 
     fn change(column: u32, pixel: Self::Pixel) -> Self::Change;
@@ -48,7 +52,7 @@ impl ShadedRows for LevelRows<'_> {
     type Pixel = u8;
     type Change = LevelChange;
 
-    const OUTSIDE: u8 = 0;
+    const OTHER: u8 = 0;
     const DEEP: u8 = 255;
 
     #[inline]
@@ -76,6 +80,52 @@ pub(crate) fn finished(width: u32, rows: RowLists<LevelChange>) -> Image {
     }
     let transitions = changes.iter().map(|change| change.column).collect();
     Image::Mask(Mask::new(width, row_offsets, transitions).expect(rises))
+}
+
+/// White pixels on one side of the part: those inside it all the way through the layer, or, if
+/// `OUTSIDE`, those inside it anywhere in the layer.
+pub(crate) struct SideRows<const OUTSIDE: bool> {
+    width: u32,
+    /// The depth from which on a face counts as lying at the layer's bottom.
+    bottom_um: f64,
+    /// The columns at which the color changes.
+    rows: RowLists<u32>,
+}
+
+impl<const OUTSIDE: bool> SideRows<OUTSIDE> {
+    pub(crate) fn new(width: u32, bottom_um: f64) -> Self {
+        Self { width, bottom_um, rows: RowLists::default() }
+    }
+
+    pub(crate) fn finish(self) -> Mask {
+        let (row_offsets, columns) = self.rows.into_arrays();
+        Mask::new(self.width, row_offsets, columns).expect("colors change at increasing columns")
+    }
+}
+
+impl<const OUTSIDE: bool> ShadedRows for SideRows<OUTSIDE> {
+    /// Whether it is white.
+    type Pixel = bool;
+    type Change = u32;
+
+    const LOOKS_FROM_OUTSIDE: bool = OUTSIDE;
+    const OTHER: bool = OUTSIDE;
+    const DEEP: bool = !OUTSIDE;
+
+    #[inline]
+    fn of_depth(&self, depth_um: f64) -> bool {
+        (depth_um < self.bottom_um) == OUTSIDE
+    }
+
+    #[inline]
+    fn change(column: u32, _is_white: bool) -> u32 {
+        column
+    }
+
+    #[inline]
+    fn rows_mut(&mut self) -> &mut RowLists<u32> {
+        &mut self.rows
+    }
 }
 
 /// The depth of the part below each pixel of a layer, in micrometers from the layer's top: zero
@@ -148,7 +198,7 @@ impl ShadedRows for DepthRows {
     type Pixel = f32;
     type Change = (u32, f32);
 
-    const OUTSIDE: f32 = 0.0;
+    const OTHER: f32 = 0.0;
     // Infinite, so that any comparison with a depth treats it as deeper.
     const DEEP: f32 = f32::INFINITY;
 

@@ -48,22 +48,29 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
             open: Vec::new(),
             met: Vec::new(),
             transitions: Vec::new(),
-            last: R::OUTSIDE,
+            last: R::Pixel::default(),
             width,
         }
     }
 
-    /// Adds the columns of a row that are part, given its sorted crossings.
+    /// Adds the columns of a row that are looked down from, and the others, given its sorted
+    /// crossings.
     fn shade_row(&mut self, row: u32, places: &[impl InRow], transitions: &[u32]) {
         let mut spans = self.spans.group(row as usize);
         let mut position = Position::outside(self.rule);
         position.start_row(places.iter().map(|place| place.turn()));
         let mut places = places;
-        self.last = R::OUTSIDE;
+        self.last = R::Pixel::default();
         self.open.clear();
-        for ends in transitions.chunks(2) {
-            // The last run of a stray row ends with the image.
-            let (start, end) = (ends[0], ends.get(1).copied().unwrap_or(self.width));
+        // Columns outside the section begin with the image. The last run ends with it: outside, or
+        // if the row is stray.
+        let (before, width) = (usize::from(R::LOOKS_FROM_OUTSIDE), self.width);
+        let change = |k: usize| match k.checked_sub(before) {
+            Some(k) => transitions.get(k).copied().unwrap_or(width),
+            None => 0,
+        };
+        for k in (0..transitions.len() + before).step_by(2) {
+            let (start, end) = (change(k), change(k + 1));
             while spans.first().is_some_and(|span| span.end <= start) {
                 spans = &spans[1..];
             }
@@ -84,12 +91,12 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
                 }
             }
             if end < self.width {
-                self.push(end, R::OUTSIDE);
+                self.push(end, R::OTHER);
             }
         }
     }
 
-    /// Adds columns of the part between two crossings of the row.
+    /// Adds columns between two crossings of the row.
     fn shade(
         &mut self,
         start: u32,
@@ -173,7 +180,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
     fn shade_over(&mut self, span: &DepthSpan, start: u32, end: u32, position: &Position<'a>) {
         self.below.move_to(position);
         self.below.step(span.body(), -span.winding());
-        if self.below.is_inside() {
+        if self.below.is_inside() != R::LOOKS_FROM_OUTSIDE {
             return self.push(start, R::DEEP);
         }
         let end = if span.is_level() { start + 1 } else { end };
@@ -183,7 +190,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         }
     }
 
-    /// Returns the depth at which the line down from a white pixel first leaves the part.
+    /// Returns the depth at which the line down from a pixel first leaves the part, or enters it.
     fn exit_um(&mut self, column: u32, section: &Position<'a>) -> Option<f64> {
         self.met.clear();
         self.met.extend(self.open.iter().map(|&span| (span.depth_um(column), span)));
@@ -212,7 +219,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
                     self.below.step(span.body(), -lost);
                 }
             }
-            if !self.below.is_inside() {
+            if self.below.is_inside() == R::LOOKS_FROM_OUTSIDE {
                 return Some(if is_touching { 0.0 } else { depth });
             }
         }

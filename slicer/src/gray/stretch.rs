@@ -178,6 +178,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::gray::Side;
     use crate::planes::{PLANE_TOLERANCE, PlaneRule};
 
     proptest! {
@@ -191,7 +192,10 @@ mod tests {
             low in 0usize..4,
         ) {
             let thickness = Length::from_um(thickness_um);
-            let planes = Planes::uniform([0.0, 900.0], thickness, PlaneRule::Top, PLANE_TOLERANCE).unwrap();
+            let planes = Planes::uniform(
+                [0.0, 900.0], thickness, PlaneRule::Top, PLANE_TOLERANCE, Side::Both,
+            );
+            let planes = planes.unwrap();
             let looks = Looks { planes: &planes, reach_um, tie_um: 0.01 };
             let heights = if is_level { [heights[0]; 2] } else { heights };
             let ends = [[columns[0], heights[0]], [columns[1], heights[1]]];

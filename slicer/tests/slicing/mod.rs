@@ -17,6 +17,7 @@ mod pitch;
 mod placement;
 mod referee;
 mod same_bytes;
+mod side;
 mod stl;
 mod ties;
 mod trace;
