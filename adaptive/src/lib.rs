@@ -3,10 +3,10 @@
 //! A layer is built as the part's section at its top, swept down. A
 //! [`LayeredPart`] compares such [`SweptLayer`]s with the part, for all tops that a
 //! layer may have at once. A [`Criterion`] measures a layer's error. A
-//! [`HeightSearch`] takes as few layers whose error is within a bound, which may differ by height, as it
-//! finds from the bottom up, or the most accurate ones within a budget (002 section 3.2), and places them
-//! where they err least together. [`WantedHeights`] names the criterion and what decides the
-//! bound.
+//! [`HeightSearch`] takes as few layers whose error is within a bound, which may differ by height, as
+//! it finds from the bottom up, or the most accurate ones within a budget (002 section 3.2), and
+//! places them where they err least together. [`WantedHeights`] names the criterion and what
+//! decides the bound.
 //!
 //! ```
 //! use lamp_adaptive::{HeightSearch, LayeredPart, Thicknesses, VolumeDeviation, Watch};
@@ -59,7 +59,7 @@ mod uniform;
 mod wanted;
 
 pub use by_height::{ByHeight, ByHeightError, HeightRange, Share};
-pub use criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
+pub use criterion::{AreaDeviation, Criterion, CuspHeight, Roughness, VolumeDeviation};
 pub use error::HeightsError;
 pub use layered_part::LayeredPart;
 pub use search::{HeightSearch, Heights, Watch};

@@ -5,7 +5,7 @@ use std::fmt;
 use lamp_stack::{Length, Pitch};
 
 use crate::by_height::ByHeight;
-use crate::criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
+use crate::criterion::{AreaDeviation, Criterion, CuspHeight, Roughness, VolumeDeviation};
 use crate::error::HeightsError;
 use crate::layered_part::LayeredPart;
 use crate::search::{HeightSearch, Heights, Watch};
@@ -27,16 +27,19 @@ pub enum Measure {
     Volume,
     /// [`CuspHeight`].
     Cusp,
+    /// [`Roughness`].
+    Ra,
     /// [`AreaDeviation`].
     Area,
 }
 
-lamp_stack::named!(Measure { Volume = "volume", Cusp = "cusp", Area = "area" });
+lamp_stack::named!(Measure { Volume = "volume", Cusp = "cusp", Ra = "ra", Area = "area" });
 
 impl Measure {
-    /// Returns the criterion that measures.
-    pub fn criterion(self) -> &'static dyn Criterion {
+    /// Returns the criterion that measures, which is `roughness` for [`Ra`](Self::Ra).
+    pub fn criterion(self, roughness: &Roughness) -> &dyn Criterion {
         match self {
+            Self::Ra => roughness,
             Self::Volume => &VolumeDeviation,
             Self::Cusp => &CuspHeight,
             Self::Area => &AreaDeviation,
@@ -77,6 +80,8 @@ pub struct WantedHeights<'a> {
     pub thicknesses: Thicknesses,
     /// The measure of a layer's error.
     pub measure: Measure,
+    /// The roughness of stairs.
+    pub roughness: Roughness,
     /// The goal that decides its bounds.
     pub goal: Goal<'a>,
     /// Makes layers end at flat faces.
@@ -88,6 +93,8 @@ pub struct WantedHeights<'a> {
 pub struct FoundHeights {
     /// The measure of a layer's error.
     pub measure: Measure,
+    /// The roughness of stairs.
+    pub roughness: Roughness,
     /// The largest errors of layers, unless no layer within the limits has one as small.
     pub bounds: ByHeight<f64>,
     /// The layers.
@@ -115,25 +122,31 @@ impl WantedHeights<'_> {
     /// # Errors
     /// Returns an error if the part is too high, or if no layers within the limits keep a budget.
     pub fn find(&self, part: &LayeredPart, watch: Watch<'_>) -> Result<FoundHeights, HeightsError> {
-        let (thicknesses, criterion) = (&self.thicknesses, self.measure.criterion());
+        let (measure, roughness) = (self.measure, self.roughness);
+        let (thicknesses, criterion) = (&self.thicknesses, measure.criterion(&roughness));
         let search = HeightSearch { part, thicknesses, criterion, snap: self.snap, watch };
         let (bound, heights) = match &self.goal {
             Goal::Bounds(bounds) => {
                 let (bounds, heights) = (bounds.clone(), search.heights(bounds.clone())?);
-                return Ok(FoundHeights { measure: self.measure, bounds, heights });
+                return Ok(FoundHeights { measure, roughness, bounds, heights });
             }
             // A layer costs one, so that the cost counts layers.
             Goal::Layers(layers) => search.within_budget(|_| 1.0, (*layers).into())?,
             Goal::Cost { of_layer, most } => search.within_budget(of_layer, *most)?,
         };
-        Ok(FoundHeights { measure: self.measure, bounds: bound.into(), heights })
+        Ok(FoundHeights { measure, roughness, bounds: bound.into(), heights })
     }
 }
 
 impl FoundHeights {
+    /// Returns the criterion that measures a layer's error.
+    pub fn criterion(&self) -> &dyn Criterion {
+        self.measure.criterion(&self.roughness)
+    }
+
     /// Returns how many layers exceed their bounds.
     pub fn past(&self, heights: &Heights) -> usize {
-        let criterion = self.measure.criterion();
+        let criterion = self.criterion();
         let is_past = |layer: &&SweptLayer| criterion.measure(layer) > self.bounds.of_layer(layer);
         heights.layers.iter().filter(is_past).count()
     }
@@ -175,8 +188,13 @@ mod tests {
         let [min, max, step] = [10.0, 100.0, 1.0].map(Length::from_um);
         let thicknesses = Thicknesses::new(min, max, step).unwrap();
         let find = |measure, goal| {
-            let wanted =
-                WantedHeights { thicknesses: thicknesses.clone(), measure, goal, snap: false };
+            let wanted = WantedHeights {
+                thicknesses: thicknesses.clone(),
+                measure,
+                roughness: Roughness::default(),
+                goal,
+                snap: false,
+            };
             wanted.find(&part, Watch::default())
         };
         let bounded = find(Measure::Volume, Goal::Bounds(0.05.into())).unwrap();
@@ -190,6 +208,10 @@ mod tests {
         assert!(few.heights.layers.len() <= 20 && few.bounds.least_and_most()[0] > 0.0);
         let cost = Goal::Cost { of_layer: &|_| 30.0, most: 20.0 * 30.0 };
         assert_eq!(find(Measure::Cusp, cost).unwrap().heights, few.heights);
+        // A quarter of the cusp.
+        let [cusps, smooth] = [(Measure::Cusp, 24.0), (Measure::Ra, 6.0)]
+            .map(|(measure, bound)| find(measure, Goal::Bounds(bound.into())).unwrap().heights);
+        assert_eq!(cusps, smooth);
         let nine = find(Measure::Area, Goal::Layers(9));
         assert!(matches!(nine, Err(HeightsError::Budget { .. })));
     }

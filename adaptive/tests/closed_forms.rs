@@ -4,8 +4,8 @@
 use std::f64::consts::PI;
 
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, HeightSearch, LayeredPart, SweptLayer, Thicknesses,
-    VolumeDeviation, Watch, uniform_heights,
+    AreaDeviation, Criterion, CuspHeight, HeightSearch, LayeredPart, Roughness, SweptLayer,
+    Thicknesses, VolumeDeviation, Watch, uniform_heights,
 };
 use lamp_fixtures::{Mesh, cone, sphere};
 use lamp_slicing::{FacetIndex, Fill, Part, Placement, Side, Units};
@@ -248,5 +248,49 @@ fn layers_on_one_side_are_within_their_bound() {
             let is_free = layer.thickness_um > 25.5 && bottom < 3.9;
             assert!((lost + gained) / volume < 0.020_02 || !is_free, "{layer:?}");
         }
+    }
+}
+
+/// Returns Ra of a wall's profile: the mean distance of stairs from their mean line, along the wall.
+fn roughness_of_stairs(thickness_um: f64, degrees: f64) -> f64 {
+    const POINTS: u32 = 20_000;
+    // The wall rises by `sin` along its length, and goes in by `cos`.
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let length = 50.0 * thickness_um / sin;
+    let distances: Vec<f64> = (0..POINTS)
+        .map(|k| {
+            // Where the normal of the wall from here meets the stairs: either the upright edge of a
+            // layer, or its level top.
+            let along = (f64::from(k) + 0.5) / f64::from(POINTS) * length;
+            let [x, z] = [along * cos, along * sin];
+            let layer = (0..=50).map(f64::from).find_map(|layer| {
+                // Layer by layer, the section at the top, swept down.
+                let [low, high] = [layer * thickness_um, (layer + 1.0) * thickness_um];
+                let edge = high * cos / sin;
+                let by_edge = (x - edge) / sin;
+                let at_edge = z + by_edge * cos;
+                if low <= at_edge && at_edge <= high && by_edge <= 0.0 {
+                    return Some(by_edge);
+                }
+                let by_top = (low - z) / cos;
+                let at_top = x - by_top * sin;
+                let below = low * cos / sin;
+                (below <= at_top && at_top <= edge && by_top <= 0.0).then_some(by_top)
+            });
+            layer.expect("every normal meets the stairs")
+        })
+        .collect();
+    let mean = distances.iter().sum::<f64>() / f64::from(POINTS);
+    distances.iter().map(|distance| (distance - mean).abs()).sum::<f64>() / f64::from(POINTS)
+}
+
+#[test]
+fn the_roughness_of_stairs_is_a_quarter_of_their_cusps() {
+    for (thickness_um, degrees) in [(100.0, 10.0), (100.0, 45.0), (25.0, 60.0), (60.0, 80.0)] {
+        let measured = roughness_of_stairs(thickness_um, degrees);
+        let steepest = degrees.to_radians().cos();
+        let layer = SweptLayer { thickness_um, steepest, ..SweptLayer::default() };
+        let expected = Roughness::default().measure(&layer);
+        assert!((measured / expected - 1.0).abs() < 2e-3, "{degrees}: {measured}, {expected}");
     }
 }

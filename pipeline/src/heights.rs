@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use lamp_adaptive::{
-    ByHeight, FoundHeights, Goal, HeightsDoubt, HeightsError, LayeredPart, Measure, Share,
-    SweptLayer, Thicknesses, WantedHeights, Watch, row_pitch,
+    ByHeight, FoundHeights, Goal, HeightsDoubt, HeightsError, LayeredPart, Measure, Roughness,
+    Share, SweptLayer, Thicknesses, WantedHeights, Watch, row_pitch,
 };
 use lamp_grayscale::exposure::Exposure;
 use lamp_slicing::{FacetIndex, Fill};
@@ -31,7 +31,7 @@ pub struct HeightSettings {
     /// Step of layer thickness, of which all are multiples; `None` is 1 um.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub step: Option<Length>,
-    /// Measure of a layer's error; `None` is volume, or cusps if `cusp` is given.
+    /// Measure of a layer's error; `None` is volume, or cusps or roughness if one is given.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub criterion: Option<Measure>,
     /// Largest error of a layer, as a share, which may differ by height; `None` is 0.02.
@@ -40,6 +40,12 @@ pub struct HeightSettings {
     /// Largest height of cusps, which may differ by height.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub cusp: Option<ByHeight<Length>>,
+    /// Largest roughness, which may differ by height.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub ra: Option<ByHeight<Length>>,
+    /// Roughness of stairs by their cusp height; `None` stands for upright edges.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub ra_line: Option<Roughness>,
     /// Most layers, in place of a bound.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub layers_budget: Option<u32>,
@@ -61,7 +67,7 @@ pub struct HeightSettings {
 pub fn measured(measure: Measure, number: f64) -> String {
     match measure {
         _ if number.is_infinite() => "none".to_owned(),
-        Measure::Cusp => format!("{}um", significant(number)),
+        Measure::Cusp | Measure::Ra => format!("{}um", significant(number)),
         Measure::Volume | Measure::Area => format!("{}%", significant(number * 100.0)),
     }
 }
@@ -134,16 +140,33 @@ impl HeightSettings {
     }
 
     fn measure(&self) -> Result<Measure, Error> {
-        let default = if self.cusp.is_some() { Measure::Cusp } else { Measure::Volume };
+        let default = match (&self.cusp, &self.ra) {
+            (Some(_), _) => Measure::Cusp,
+            (_, Some(_)) => Measure::Ra,
+            _ => Measure::Volume,
+        };
         let criterion = self.criterion.unwrap_or(default);
-        match (criterion == Measure::Cusp, self.cusp.is_some()) {
-            (false, true) => Err(Error::settings("--cusp needs --criterion cusp")),
-            // A deviation is a share, which bounds no cusp: cusps are lengths.
-            (true, false) if self.deviation.is_some() || !self.has_budget() => {
-                Err(Error::settings("--criterion cusp needs a bound, such as --cusp 10um"))
+        for (measure, bound, example) in
+            [(Measure::Cusp, &self.cusp, "--cusp 10um"), (Measure::Ra, &self.ra, "--ra 6um")]
+        {
+            match (criterion == measure, bound.is_some()) {
+                (false, true) => {
+                    let why = format!("--{measure} needs --criterion {measure}");
+                    return Err(Error::settings(why));
+                }
+                // A deviation is a share, which bounds no length.
+                (true, false) if self.deviation.is_some() || !self.has_budget() => {
+                    let why = format!("--criterion {measure} needs a bound, such as {example}");
+                    return Err(Error::settings(why));
+                }
+                _ => {}
             }
-            _ => Ok(criterion),
         }
+        if self.ra_line.is_some() && criterion != Measure::Ra {
+            let why = "--ra-line needs a bound of roughness, such as --ra 6um, or --criterion ra";
+            return Err(Error::settings(why));
+        }
+        Ok(criterion)
     }
 
     /// Searches for the heights.
@@ -175,8 +198,8 @@ impl HeightSettings {
         let goal = match (self.layers_budget, self.time_budget, &cost) {
             (Some(layers), ..) => Goal::Layers(layers),
             (_, Some(Seconds(most)), Some(cost)) => Goal::Cost { of_layer: cost, most },
-            _ => Goal::Bounds(match (&self.cusp, &self.deviation) {
-                (Some(cusps), _) => cusps.map(|cusp| cusp.um()),
+            _ => Goal::Bounds(match (self.cusp.as_ref().or(self.ra.as_ref()), &self.deviation) {
+                (Some(lengths), _) => lengths.map(|length| length.um()),
                 (None, Some(shares)) => shares.map(|Share(share)| *share),
                 (None, None) => 0.02.into(),
             }),
@@ -184,7 +207,8 @@ impl HeightSettings {
         let (thicknesses, measure, snap) = (self.thicknesses()?, self.measure()?, self.snap);
         let part_um = part.heights_um();
         let watch = |layer: &SweptLayer| watcher.height_reached(part_um, layer.top_um());
-        let wanted = WantedHeights { thicknesses, measure, goal, snap };
+        let roughness = self.ra_line.unwrap_or_default();
+        let wanted = WantedHeights { thicknesses, measure, roughness, goal, snap };
         let found = wanted.find(part, Watch(&watch));
         let found = found.map_err(|error| over(error, &wanted.goal))?;
         if let Some(exposure) = exposure {

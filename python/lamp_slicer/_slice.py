@@ -53,9 +53,11 @@ def slice(
     min: Optional[str] = None,
     max: Optional[str] = None,
     step: Optional[str] = None,
-    criterion: Optional[Literal["volume", "cusp", "area"]] = None,
+    criterion: Optional[Literal["volume", "cusp", "ra", "area"]] = None,
     deviation: Union[float, str, None] = None,
     cusp: Optional[str] = None,
+    ra: Optional[str] = None,
+    ra_line: Optional[str] = None,
     layers_budget: Optional[int] = None,
     time_budget: Optional[str] = None,
     layer_overhead: Optional[str] = None,
@@ -95,7 +97,7 @@ def slice(
     scale, mirror, rotate, translate: its place, in this order: rotate=["x:90", "z:-12.5"],
         translate=(0, 0, 5) in millimeters.
     margin, or origin (in millimeters) and size: the pixels of the images.
-    adaptive, min, max, step, criterion, deviation, cusp, layers_budget, time_budget,
+    adaptive, min, max, step, criterion, deviation, cusp, ra, ra_line, layers_budget, time_budget,
         layer_overhead, snap, row_pitch: layers as thick as the part's slopes allow. A bound may
         differ by height: deviation="2%@0mm..12mm,0.5%@12mm..".
     material, overcure, lamp_intensity, or exposure_table: exposure times of the layers.
@@ -130,6 +132,8 @@ def slice(
         "criterion": criterion,
         "deviation": deviation,
         "cusp": cusp,
+        "ra": ra,
+        "ra_line": ra_line,
         "layers_budget": layers_budget,
         "time_budget": time_budget,
         "layer_overhead": layer_overhead,

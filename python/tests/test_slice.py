@@ -67,6 +67,8 @@ def test_keywords_are_the_options_of_the_program(tmp_path, stl, program):
         ({"origin": (-9, 9.5), "size": "20x20mm"}, ["--origin=-9,9.5", "--size", "20x20mm"]),
         ({"adaptive": True, "deviation": 0.05, "max": "300um", "snap": True},
          ["--adaptive", "--deviation", "0.05", "--max", "300um", "--snap"]),
+        ({"adaptive": True, "ra": "6um", "ra_line": "0.2,1um"},
+         ["--adaptive", "--ra", "6um", "--ra-line", "0.2,1um"]),
         ({"side": "outside", "thickness": "0.5mm"}, ["--side", "outside", "--thickness", "0.5mm"]),
         ({"adaptive": True, "deviation": "5%@..2mm,1%@2mm.."},
          ["--adaptive", "--deviation", "5%@..2mm,1%@2mm.."]),

@@ -179,6 +179,36 @@ fn stacks_contain_a_sphere_or_lie_inside() {
     }
 }
 
+/// Stairs are a quarter as rough as their cusps are high, unless a line says otherwise.
+#[test]
+fn roughness_bounds_layers() {
+    let scratch = Scratch::new();
+    scratch.mesh("cone.stl", &cone(5.0, 1.0, 4.0, 2_000));
+    let layers = |options: &str| {
+        let line = format!("lamp heights cone.stl --min 5um {options} --csv heights.csv");
+        let said = String::from_utf8(scratch.run(&line).succeeds().stdout).unwrap();
+        // Without exposures, which are not given.
+        let rows = report(&scratch, "heights.csv");
+        (said, rows.iter().map(|row| row[..9].to_vec()).collect::<Vec<_>>())
+    };
+    let (said, rough) = layers("--ra 5.9um");
+    let (_, cusps) = layers("--cusp 23.6um");
+    let (_, line) = layers("--ra 6.32um --ra-line 0.2,1.6um");
+    assert!(said.contains("ra 5.90um") && rough == cusps && line == cusps, "{said}");
+    // A slope of 45 degrees: 33 um have cusps of 23.3 um.
+    assert!(rough.iter().all(|row| row[2] <= 33.0) && rough.len() == 122, "{}", rough.len());
+    for (options, why) in [
+        ("--ra 6um --cusp 9um", "cannot be used with"),
+        ("--criterion ra", "--criterion ra needs a bound, such as --ra 6um"),
+        ("--ra 6um --criterion volume", "--ra needs --criterion ra"),
+        ("--ra-line 0.2,1um", "--ra-line needs a bound of roughness"),
+        ("--ra 6um --ra-line 0.2", "`0.2` is no line of roughness"),
+    ] {
+        let ran = scratch.run(&format!("lamp heights cone.stl {options}"));
+        assert!(ran.statuses == [Some(2)] && ran.stderr.contains(why), "{ran:?}");
+    }
+}
+
 #[test]
 fn every_stage_keeps_what_layers_say() {
     let scratch = with_tower();

@@ -1,7 +1,7 @@
 //! Options of adaptive layer heights.
 
 use clap::Args;
-use lamp_adaptive::{ByHeight, Measure, Share};
+use lamp_adaptive::{ByHeight, Measure, Roughness, Share};
 use lamp_pipeline::heights::{HeightSettings, Seconds};
 use lamp_stack::Length;
 
@@ -25,7 +25,8 @@ pub(crate) struct HeightArgs {
     step: Option<Length>,
 
     /// Measure of a layer's error: the volume missing or in excess, the height of cusps at its
-    /// edge, or the change of its section's area [default: volume, or cusp with --cusp]
+    /// edge, the roughness Ra of its stairs, or the change of its section's area [default: volume, or
+    /// cusp with --cusp, ra with --ra]
     #[arg(long, value_parser = one_of::<Measure>(), help_heading = HEIGHTS)]
     criterion: Option<Measure>,
 
@@ -40,19 +41,31 @@ pub(crate) struct HeightArgs {
     /// Largest cusp height: how far a layer's edge may be off the surface, along its normal
     ///
     /// 20um@0mm..12mm,5um@12mm.. gives each range of height its own bound
-    #[arg(long, value_name = "LENGTH", value_parser = parse_cusps, help_heading = HEIGHTS)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_lengths, help_heading = HEIGHTS)]
     #[arg(conflicts_with = "deviation")]
     cusp: Option<ByHeight<Length>>,
 
+    /// Largest roughness Ra of the surface's stairs
+    ///
+    /// 6um@0mm..12mm,2um@12mm.. gives each range of height its own bound
+    #[arg(long, value_name = "LENGTH", value_parser = parse_lengths, help_heading = HEIGHTS)]
+    #[arg(conflicts_with_all = ["deviation", "cusp"])]
+    ra: Option<ByHeight<Length>>,
+
+    /// Roughness of stairs by their cusp height, Ra = K cusp + C, as measured on your machine
+    /// [default: 0.25,0um, as of upright edges]
+    #[arg(long, value_name = "K,C", help_heading = HEIGHTS)]
+    ra_line: Option<Roughness>,
+
     /// Use at most N layers, with the smallest possible error (found to within one percent)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    #[arg(conflicts_with_all = ["deviation", "cusp", "time_budget"], help_heading = HEIGHTS)]
+    #[arg(conflicts_with_all = ["deviation", "cusp", "ra", "time_budget"], help_heading = HEIGHTS)]
     layers_budget: Option<u32>,
 
     /// Build all layers within this time, for example 8h, 90min or 1200s. It includes exposures,
     /// from --material or --exposure-table, and --layer-overhead
     #[arg(long, value_name = "TIME", help_heading = HEIGHTS)]
-    #[arg(conflicts_with_all = ["deviation", "cusp"])]
+    #[arg(conflicts_with_all = ["deviation", "cusp", "ra"])]
     time_budget: Option<Seconds>,
 
     /// Time per layer in addition to its exposure, mostly for recoating, for example 30s
@@ -78,6 +91,8 @@ impl From<&HeightArgs> for HeightSettings {
             criterion: args.criterion,
             deviation: args.deviation.clone(),
             cusp: args.cusp.clone(),
+            ra: args.ra.clone(),
+            ra_line: args.ra_line,
             layers_budget: args.layers_budget,
             time_budget: args.time_budget,
             layer_overhead: args.layer_overhead,
@@ -88,6 +103,6 @@ impl From<&HeightArgs> for HeightSettings {
 }
 
 /// Parses lengths above zero that may differ by height.
-fn parse_cusps(text: &str) -> Result<ByHeight<Length>, String> {
+fn parse_lengths(text: &str) -> Result<ByHeight<Length>, String> {
     ByHeight::parse(text, parse_thickness).map_err(|error| error.to_string())
 }

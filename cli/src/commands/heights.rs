@@ -208,9 +208,9 @@ impl HeightsArgs {
 struct HeightsAnswer {
     /// Name of the part or of its file.
     part: String,
-    /// The bounded measure: `volume`, `cusp` or `area`.
+    /// The bounded measure: `volume`, `cusp`, `ra` or `area`.
     criterion: &'static str,
-    /// Its bound: a share, or micrometers for `cusp`; the smallest one if bounds differ by height.
+    /// Its bound: a share, or micrometers for `cusp` and `ra`; the smallest one if bounds differ by height.
     bound: f64,
     /// The bounds by height, from below.
     bounds: Vec<BoundRange>,
@@ -351,7 +351,7 @@ impl Choice {
     ) -> Self {
         let layers = &heights.layers;
         let [lost_mm3, gained_mm3, volume_mm3] = heights.volumes_mm3();
-        let measures = layers.iter().map(|layer| found.measure.criterion().measure(layer));
+        let measures = layers.iter().map(|layer| found.criterion().measure(layer));
         // One layer without a time leaves the sum unknown.
         let ms: Option<f64> =
             layers.iter().map(|layer| LayerRow::new(layer, exposure).exposure_ms).sum();
