@@ -331,8 +331,8 @@ mod tests {
             shares in prop::collection::vec(0u32..300_000, 6),
             [open_below, open_above] in [any::<bool>(); 2],
         ) {
-            let heights: Vec<Length> = um.iter().map(|um| Length::from_um(*um as f64 / 8.0)).collect();
-            let mut ends: Vec<Option<Length>> = heights.into_iter().map(Some).collect();
+            let height = |um: &i64| Some(Length::from_um(*um as f64 / 8.0));
+            let mut ends: Vec<Option<Length>> = um.iter().map(height).collect();
             if open_below { ends.insert(0, None); }
             if open_above || ends.len() < 2 { ends.push(None); }
             let range = |(pair, share): (&[Option<Length>], &u32)| HeightRange {

@@ -78,7 +78,7 @@ impl Criterion for CuspHeight {
 /// distance of the profile from its mean line.
 ///
 /// The default is the roughness of stairs with upright edges. Their profile is a sawtooth as high as
-/// the cusp, `t |N_z|`. Heights along a sawtooth are spread evenly, whatever its teeth, so that their
+/// the cusp, `t |N_z|`. Heights along a sawtooth are spread evenly, whatever its teeth, so their
 /// mean distance from the middle is a quarter of its height: `k = 1/4`, `c = 0`. Edges of cured
 /// layers are rounder; `k` and `c` of a machine are the line through measured values of Ra over
 /// `t |N_z|`.

@@ -35,8 +35,8 @@ pub enum HeightsError {
     },
     /// Bounds differ by height, and the part has heights without one.
     #[error(
-        "no bound holds from {from} to {to}, where the part is: let the ranges cover it, such as by an \
-         open end"
+        "no bound holds from {from} to {to}, where the part is: let the ranges cover it, such as by \
+         an open end"
     )]
     NoBound {
         /// The lower end of these heights.

@@ -3,8 +3,8 @@
 //! A layer is built as the part's section at its top, swept down. A
 //! [`LayeredPart`] compares such [`SweptLayer`]s with the part, for all tops that a
 //! layer may have at once. A [`Criterion`] measures a layer's error. A
-//! [`HeightSearch`] takes as few layers whose error is within a bound, which may differ by height, as
-//! it finds from the bottom up, or the most accurate ones within a budget (002 section 3.2), and
+//! [`HeightSearch`] takes as few layers whose error is within a bound, which may differ by height,
+//! as it finds from the bottom up, or the most accurate ones within a budget (002 section 3.2), and
 //! places them where they err least together. [`WantedHeights`] names the criterion and what
 //! decides the bound.
 //!

@@ -210,7 +210,8 @@ struct HeightsAnswer {
     part: String,
     /// The bounded measure: `volume`, `cusp`, `ra` or `area`.
     criterion: &'static str,
-    /// Its bound: a share, or micrometers for `cusp` and `ra`; the smallest one if bounds differ by height.
+    /// Its bound: a share, or micrometers for `cusp` and `ra`; the smallest one if bounds differ by
+    /// height.
     bound: f64,
     /// The bounds by height, from below.
     bounds: Vec<BoundRange>,

@@ -8,7 +8,7 @@ use super::print_through::PrintThrough;
 use crate::planes::Planes;
 
 /// The gray of layers where the part is less deep than the light reaches, or their side of the part.
-/// Unless all pixels are those of sections, layers are swept down from sections at their tops
+/// Unless pixels show the section alone, layers are swept down from sections at their tops
 /// ([`PlaneRule::Top`](crate::PlaneRule::Top)).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Shading {
