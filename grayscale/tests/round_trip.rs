@@ -97,6 +97,7 @@ fn widths() -> impl Strategy<Value = Vec<WidthNumbers>> {
     proptest::collection::vec(numbers, 0..3).prop_map(|sizes| {
         let size = |(k, (share, critical_dose, sensitivity, measured))| WidthNumbers {
             feature_size: Length::from_um(f64::from(k) + share),
+            direction: None,
             critical_dose,
             sensitivity,
             measured,
@@ -194,6 +195,7 @@ fn materials() -> impl Strategy<Value = Material> {
                 spread,
                 gamma,
                 laws: vec![law],
+                many_layers: gamma.clone(),
                 working_curve: Some(curve),
                 gray,
                 gray_light,

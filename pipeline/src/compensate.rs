@@ -205,9 +205,9 @@ struct BySpread {
     lamp_doubt: Option<String>,
 }
 
-/// A cure width, and the doses that it is for.
+/// Cure widths along x and y, and the doses that they are for.
 struct ByCureWidth {
-    width: CureWidth,
+    widths: [CureWidth; 2],
     material: Material,
     dose: Option<Dose>,
     doses: MeasuredDoses,
@@ -254,28 +254,35 @@ impl EdgeMove {
         let dose = args.dose;
         let spread = material.spread().map_err(at_name)?;
         let has_directions = spread.is_some_and(|spread| spread.sigma().is_none());
-        let width = material.cure_width().map_err(at_name)?;
+        let widths = material.cure_widths().map_err(at_name)?;
         // Squares measure one cure width for all directions: two widths of light say more.
         let light = material.edge_light().map_err(at_name)?;
-        if let Some(light) = light.filter(|_| has_directions || width.is_none()) {
+        if let Some(light) = light.filter(|_| has_directions || widths.is_none()) {
             return Ok(Self::Spread(Box::new(BySpread { light, material, dose, lamp_doubt })));
         }
-        let width = width.ok_or_else(|| {
+        let widths = widths.ok_or_else(|| {
             Error::work(format!(
                 "{name} states no cure width: add [[cure-width]] or the critical-dose of [spread] \
                  to its file, or give --uniform"
             ))
         })?;
-        let of_directions = has_directions.then(|| {
+        let two = widths[0] != widths[1];
+        let of_directions = (has_directions && !two).then(|| {
             format!(
                 "light of {name} spreads differently along and across the scan, and its cure \
                  widths do not: add the critical-dose of [spread], as lamp calibrate scan does"
             )
         });
+        let of_sizes = (two && widths.iter().any(|width| width.lines().len() > 1)).then(|| {
+            format!(
+                "cure widths of {name} differ along and across the scan: all features move as its \
+                 largest squares do"
+            )
+        });
         let doses = MeasuredDoses::of_widths(&material);
         // The critical dose of depths, which lamp_doubt is on, does not matter to widths.
-        let more_doubts = width_doubt.into_iter().chain(of_directions).collect();
-        Ok(Self::CureWidth(Box::new(ByCureWidth { width, material, dose, doses, more_doubts })))
+        let more_doubts = width_doubt.into_iter().chain(of_directions).chain(of_sizes).collect();
+        Ok(Self::CureWidth(Box::new(ByCureWidth { widths, material, dose, doses, more_doubts })))
     }
 
     /// Returns sentences on a lamp and on doses at which the widths were not measured.
@@ -310,7 +317,14 @@ impl EdgeMove {
                 let dose = by.dose.map_or_else(|| dose_of(layer, &by.material), Ok)?;
                 // Doubts need the doses of all layers, which are known only at the end.
                 by.doses.see(dose);
-                (&by.width, dose)
+                let dose = by.of_many_layers(layer, dose)?;
+                let [x, y] = &by.widths;
+                if x != y {
+                    // 002 section 3.4.4: beyond the largest size widths stay.
+                    let of = |width: &CureWidth| width.width(dose, Length::from_um(f64::MAX));
+                    return Ok(elliptic([of(x), of(y)], pitch));
+                }
+                (x, dose)
             }
         };
         // The image has the wanted sizes, not the sizes to expose.
@@ -322,6 +336,25 @@ impl EdgeMove {
         let pitch = dpi.pitch().um();
         let size = |pixels: f64| Length::from_um(pixels * pitch);
         Ok(Widths::by_size(&sizes, |pixels| width.width_of_cured(dose, size(pixels)).pixels(dpi)))
+    }
+}
+
+impl ByCureWidth {
+    /// Returns the dose that counts for the width of a layer, with its share of the doses of the layers
+    /// above (002 section 3.4.8 a).
+    fn of_many_layers(&self, layer: &Layer, dose: Dose) -> Result<Dose, Error> {
+        if self.material.many_layers.is_none() {
+            return Ok(dose);
+        }
+        let thickness = layer.info.thickness_um.filter(|um| *um > 0.0 && um.is_finite());
+        let thickness = thickness.ok_or_else(|| {
+            let (layer, name) = (layer.info.name(), &self.material.name);
+            let why = format!("{layer} states no thickness, which [many-layers] of {name} needs");
+            Error::new(ErrorKind::Work, NoDose(why))
+        })?;
+        let times = self.material.many_layers(Length::from_um(thickness));
+        let times = times.map_err(|error| Error::new(ErrorKind::Work, error))?;
+        Ok(Dose::from_mj_per_cm2(dose.mj_per_cm2() * times))
     }
 }
 
@@ -419,10 +452,61 @@ impl fmt::Display for FiringShrinkage {
 
 #[cfg(test)]
 mod tests {
+    use lamp_stack::{Image, Mask, PageInfo};
+
     use super::*;
 
     fn parsed(text: &str) -> Result<Shrinkage, String> {
         text.parse().map(FiringShrinkage::shares)
+    }
+
+    /// The widths of a layer of 100 um that gets 200 mJ/cm², at 10 um a pixel.
+    fn widths_of(material: &str) -> Widths {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let head = "name = \"mine\"\ndescription = \"\"\n[working-curve]\n\
+                    critical-dose = { value = \"50 mJ/cm2\", source = \"a\" }\n\
+                    penetration-depth = { value = \"200 um\", source = \"a\" }\n";
+        std::fs::write(file.path(), format!("{head}{material}")).unwrap();
+        let settings = CompensateSettings {
+            material: Some(file.path().to_owned()),
+            dose: Some(Dose::from_mj_per_cm2(200.0)),
+            ..CompensateSettings::default()
+        };
+        let info = PageInfo { thickness_um: Some(100.0), ..PageInfo::default() };
+        let pitch = Pitch::of_dpi(2540.0).unwrap();
+        let image = Image::Mask(Mask::new(1, vec![0, 0], vec![]).unwrap()).into();
+        let layer = Layer { info, pitch: Some(pitch), image };
+        EdgeMove::of(&settings).unwrap().widths(&layer, pitch).unwrap()
+    }
+
+    fn cure_width(more: &str, critical: f64) -> String {
+        format!(
+            "[[cure-width]]\nfeature-size = \"8 mm\"\n{more}\
+             critical-dose = {{ value = \"{critical} mJ/cm2\", source = \"a\" }}\n\
+             sensitivity = {{ value = \"0.25 um/(mJ/cm2)\", source = \"a\" }}\n"
+        )
+    }
+
+    #[test]
+    fn widths_of_two_directions_move_edges_by_an_ellipse() {
+        let sizes = ["across", "along"].map(|direction| format!("direction = \"{direction}\"\n"));
+        let widths = widths_of(&(cure_width(&sizes[0], 80.0) + &cure_width(&sizes[1], 40.0)));
+        // 0.25 (200 - 80) and 0.25 (200 - 40) um, in pixels of 10 um.
+        let [x, y] = widths.range();
+        assert!((x - 3.0).abs() < 1e-9 && (y - 4.0).abs() < 1e-9, "{x} {y}");
+        // Along y edges move farther.
+        assert_eq!(widths, Widths::elliptic([x, y]));
+    }
+
+    #[test]
+    fn doses_of_layers_above_widen_by_their_share() {
+        let share = "[many-layers]\nvalue = 0.5\nsource = \"a\"\n";
+        let [least, most] = widths_of(&(cure_width("", 80.0) + share)).range();
+        // 1/(1 - exp(-1/2)) is 2.541494: half of the 1.541494 above counts.
+        let wanted = 0.025 * (200.0 * (1.0 + 0.5 * 1.541_494) - 80.0);
+        assert!((least - wanted).abs() < 1e-4 && (most - wanted).abs() < 1e-4, "{least} {wanted}");
+        let [alone, _] = widths_of(&cure_width("", 80.0)).range();
+        assert!((alone - 3.0).abs() < 1e-9, "{alone}");
     }
 
     #[test]

@@ -552,3 +552,43 @@ fn cure_widths_follow_the_lamp() {
     let stays = scratch.run(&stays).succeeds();
     assert!(stays.stderr.contains("cure widths stay, though real ones move"), "{stays:?}");
 }
+
+/// Squares along and across the scan, and of twenty layers (002 section 3.4.8 a and b).
+#[test]
+fn widths_have_directions_and_layers() {
+    let scratch = Scratch::new();
+    let mut noise = SplitMix(348);
+    let doses = || (1..=10).map(|k| 50.0 * f64::from(k));
+    let mut csv = "direction,feature_px,dose_mj_per_cm2,width_um\n".to_owned();
+    for (direction, slope) in [("across", 0.1), ("along", 0.2)] {
+        for mj in doses() {
+            let width = slope * (mj - 100.0_f64).max(0.0) + 0.5 * noise.normal();
+            csv += &format!("{direction},500,{mj},{width:.3}\n");
+        }
+    }
+    scratch.write("two.csv", csv.as_bytes());
+    let line = "lamp calibrate width two.csv --material lamp-suspension -o two.toml";
+    let table = said(&scratch, line);
+    answers(&scratch, line, &table);
+    assert!(table.contains("500 px (8466.67 um), along the scan: 10 points"), "{table}");
+    holds(estimate(&table, "Dp^w (um/(mJ/cm2))", 0), 0.1);
+    holds(estimate(&table, "Dp^w (um/(mJ/cm2))", 1), 0.2);
+    assert!(text(&scratch, "two.toml").contains("direction = \"across\""));
+    let mut csv = "layers,feature_px,dose_mj_per_cm2,width_um\n".to_owned();
+    // Doses of layers of 100 um, whose white fades over 215.2 um, layer by layer.
+    let above: f64 = (1..20).map(|layer| (-100.0 * f64::from(layer) / 215.2).exp()).sum();
+    for (layers, above) in [(1, 0.0), (20, above)] {
+        for mj in doses() {
+            let width = 0.1 * (mj * (1.0 + 0.2 * above) - 100.0_f64).max(0.0);
+            csv += &format!("{layers},500,{mj},{:.3}\n", width + 0.5 * noise.normal());
+        }
+    }
+    scratch.write("blocks.csv", csv.as_bytes());
+    let line = "lamp calibrate width blocks.csv --material lamp-suspension -o blocks.toml";
+    scratch.run(line).is_wrong_usage(&["give --thickness"]);
+    let line = &format!("{line} --thickness 100um");
+    let table = said(&scratch, line);
+    answers(&scratch, line, &table);
+    holds(estimate(&table, "share of doses above (1)", 0), 0.2);
+    assert!(text(&scratch, "blocks.toml").contains("[many-layers]\nvalue = 0."));
+}

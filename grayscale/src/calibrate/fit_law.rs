@@ -251,6 +251,7 @@ impl LawFit<WidthSensitivity> {
     pub fn numbers(&self, at: f64, feature_size: Length, source: &str) -> WidthNumbers {
         WidthNumbers {
             feature_size,
+            direction: None,
             critical_dose: self.critical_dose(at).given(source),
             sensitivity: self.sensitivity(at).given(source),
             measured: self.extent.map(|extent| extent.measured(source)),

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use lamp_stack::Length;
+use serde::{Deserialize, Serialize};
 
 use super::least_squares;
 use super::matrix::inverse;
@@ -13,7 +14,8 @@ use crate::material::SpreadNumbers;
 use crate::resin::{CuredLineWidth, Dose, cured_line};
 
 /// The direction in which a width is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ScanDirection {
     /// Across the scan, along x: the line runs along the scan.
     Across,

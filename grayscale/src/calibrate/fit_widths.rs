@@ -3,9 +3,12 @@
 use lamp_stack::Length;
 
 use super::extent::Extent;
+use super::fit_scan::ScanDirection;
 use super::hinge::HingeFit;
+use super::matrix::inverse;
 use super::measurements::WidthPoint;
-use super::{Estimate, FitError, PointGroup};
+use super::student_t::t_95;
+use super::{Estimate, FitError, PointGroup, least_squares};
 use crate::material::WidthNumbers;
 use crate::resin::{Dose, WidthSensitivity};
 
@@ -14,6 +17,8 @@ use crate::resin::{Dose, WidthSensitivity};
 pub struct WidthFit {
     /// The squares' side in the image.
     pub feature_size: Length,
+    /// The direction of the widths, if they were measured along and across the scan apart.
+    pub direction: Option<ScanDirection>,
     /// `E_c^w`, from which dose on they grow.
     pub critical_dose: Estimate<Dose>,
     /// `D_p^w`, the line's slope.
@@ -28,8 +33,8 @@ pub struct WidthFit {
     hinge: HingeFit,
 }
 
-/// Fits `C_w = D_p^w (E - E_c^w)`, and zero up to `E_c^w`, to all squares of each size, from the
-/// smallest, by least squares of the width over the dose, not over its logarithm (002 section
+/// Fits `C_w = D_p^w (E - E_c^w)`, and zero up to `E_c^w`, to all squares of one layer of each size and
+/// direction, from the smallest, by least squares of the width over the dose, not over its logarithm (002 section
 /// 3.4.4).
 ///
 /// Squares that did not grow show where growth begins, as squares that grew do. Without them, only
@@ -44,12 +49,17 @@ pub struct WidthFit {
 /// its width might not rise with the dose, or rises from no dose above zero or at the highest dose
 /// alone.
 pub fn fit_widths(points: &[WidthPoint]) -> Result<Vec<WidthFit>, FitError> {
-    let mut sorted = points.to_vec();
-    sorted.sort_by(|a, b| a.feature_size.um().total_cmp(&b.feature_size.um()));
+    let mut sorted: Vec<_> = points.iter().filter(|point| point.layers == 1).copied().collect();
+    let of_direction = |point: &WidthPoint| point.direction.map(|direction| direction as u8);
+    sorted.sort_by(|a, b| {
+        let sizes = a.feature_size.um().total_cmp(&b.feature_size.um());
+        sizes.then(of_direction(a).cmp(&of_direction(b)))
+    });
     if sorted.is_empty() {
         return Err(FitError::TooFew { points: 0, needed: 3 });
     }
-    let groups = sorted.chunk_by(|a, b| a.feature_size == b.feature_size);
+    let groups =
+        sorted.chunk_by(|a, b| (a.feature_size, a.direction) == (b.feature_size, b.direction));
     let fit = |group: &[WidthPoint]| {
         let size = group[0].feature_size;
         fit_size(size, group).map_err(|error| error.within(PointGroup::Squares(size)))
@@ -67,6 +77,7 @@ fn fit_size(feature_size: Length, points: &[WidthPoint]) -> Result<WidthFit, Fit
     let [slope, least, most] = hinge.slope;
     Ok(WidthFit {
         feature_size,
+        direction: points[0].direction,
         critical_dose: Estimate::new(onset, low, high),
         sensitivity: Estimate::new(slope, least, most),
         r2: hinge.r2,
@@ -89,11 +100,106 @@ impl WidthFit {
     pub fn numbers(&self, source: &str) -> WidthNumbers {
         WidthNumbers {
             feature_size: self.feature_size,
+            direction: self.direction,
             critical_dose: self.critical_dose.given(source),
             sensitivity: self.sensitivity.given(source),
             measured: self.extent.map(|extent| extent.measured(source)),
         }
     }
+}
+
+/// How much the doses of the layers above count for the cure width, found from measurements.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ManyLayersFit {
+    /// The share of their doses, with the ends of its 95% interval.
+    pub share: [f64; 3],
+    /// The size of the squares.
+    pub feature_size: Length,
+    /// The number of points, of one layer and of many.
+    pub points: usize,
+}
+
+/// Fits the share `s` of the doses of the layers above that counts for the cure width, with the line of
+/// the squares: `D_p^w (E (1 + s (S - 1)) - E_c^w)`, zero below. `summed` gives `S`, how many times
+/// its own dose the lowest of so many layers gets ([`summed_doses`](crate::resin::summed_doses)). 002
+/// section 3.4.8 a says only that parts of many layers grow slightly more: the model is assumed.
+///
+/// The interval is by the covariance of the fit and Student's t. Returns `None` if all squares have one
+/// layer.
+///
+/// # Errors
+/// Returns an error if squares of many layers have several sizes or a direction, if squares of one
+/// layer and that size give no line, or if there are too few points.
+pub fn fit_many_layers(
+    points: &[WidthPoint],
+    summed: impl Fn(u32) -> f64,
+) -> Result<Option<ManyLayersFit>, FitError> {
+    let Some(first) = points.iter().find(|point| point.layers > 1) else { return Ok(None) };
+    let feature_size = first.feature_size;
+    let others = |point: &WidthPoint| {
+        point.layers > 1 && (point.feature_size != feature_size || point.direction.is_some())
+    };
+    if points.iter().any(others) {
+        return Err(FitError::LayersOfSeveral);
+    }
+    let of_size =
+        |point: &&WidthPoint| point.feature_size == feature_size && point.direction.is_none();
+    let points: Vec<_> = points.iter().filter(of_size).copied().collect();
+    let group = PointGroup::Squares(feature_size);
+    let single: Vec<_> = points.iter().filter(|point| point.layers == 1).copied().collect();
+    let start = fit_size(feature_size, &single).map_err(|error| error.within(group))?;
+    if points.len() < 5 {
+        return Err(FitError::TooFew { points: points.len(), needed: 5 }.within(group));
+    }
+    let measured: Vec<_> = points
+        .iter()
+        .map(|p| [p.dose.mj_per_cm2(), summed(p.layers) - 1.0, p.width.um()])
+        .collect();
+    // The slope, the critical dose and the share; and the derivatives of the width over them.
+    let width = |[slope, critical, share]: &[f64; 3], [dose, above, _]: [f64; 3]| {
+        let rise = dose * (1.0 + share * above) - critical;
+        if rise > 0.0 {
+            (slope * rise, [rise, -slope, slope * dose * above])
+        } else {
+            (0.0, [0.0; 3])
+        }
+    };
+    let squares = |numbers: &[f64; 3]| -> f64 {
+        measured.iter().map(|row| (row[2] - width(numbers, *row).0).powi(2)).sum()
+    };
+    let normal = |numbers: &[f64; 3]| {
+        let (mut matrix, mut vector) = ([[0.0; 3]; 3], [0.0; 3]);
+        for row in &measured {
+            let (value, slopes) = width(numbers, *row);
+            for i in 0..3 {
+                vector[i] += slopes[i] * (row[2] - value);
+                for j in 0..3 {
+                    matrix[i][j] += slopes[i] * slopes[j];
+                }
+            }
+        }
+        (matrix, vector)
+    };
+    let starts = [0.0, 0.1, 0.3, 1.0].map(|share| {
+        let critical = start.critical_dose.value.mj_per_cm2();
+        [start.sensitivity.value.um_per_mj_per_cm2(), critical, share]
+    });
+    let found = starts.iter().filter_map(|start| {
+        let moved =
+            |numbers: &[f64; 3], step: [f64; 3]| std::array::from_fn(|i| numbers[i] + step[i]);
+        least_squares::fitted(*start, squares, normal, moved)
+    });
+    let best = found.min_by(|a, b| squares(a).total_cmp(&squares(b))).ok_or(FitError::NoLines)?;
+    let covariance = inverse(normal(&best).0).ok_or(FitError::NoLines)?;
+    let freedom = measured.len() - 3;
+    let half = t_95(freedom) * (covariance[2][2] * squares(&best) / freedom as f64).sqrt();
+    let value = best[2];
+    if value < 0.0 {
+        let what = "the share of the doses of layers above";
+        return Err(FitError::Vague { what, value, half, unit: "" }.within(group));
+    }
+    let share = [value, value - half, value + half];
+    Ok(Some(ManyLayersFit { share, feature_size, points: measured.len() }))
 }
 
 #[cfg(test)]
@@ -118,7 +224,7 @@ mod tests {
         let point = |mj| {
             let dose = Dose::from_mj_per_cm2(mj);
             let width = Length::from_um(truth.width(dose).um() + error());
-            WidthPoint { feature_size: truth.feature_size, dose, width }
+            WidthPoint { feature_size: truth.feature_size, dose, width, direction: None, layers: 1 }
         };
         DOSES.map(point).to_vec()
     }
@@ -149,7 +255,13 @@ mod tests {
             let point = |i: u32| {
                 let dose = Dose::from_mj_per_cm2(60.0 * f64::from(i));
                 let width = Length::from_um(truth.width(dose).um() + spread * noise.normal());
-                WidthPoint { feature_size: truth.feature_size, dose, width }
+                WidthPoint {
+                    feature_size: truth.feature_size,
+                    dose,
+                    width,
+                    direction: None,
+                    layers: 1,
+                }
             };
             let points: Vec<_> = (1..=10).map(point).collect();
             fit_widths(&points).map(|mut fits| fits.remove(0))
@@ -192,6 +304,73 @@ mod tests {
         assert!(fit.critical_dose.holds(truth.critical_dose));
         let width = fit.width(Dose::from_mj_per_cm2(200.0));
         assert_eq!((width.value.um(), width.low.um()), (0.0, 0.0));
+    }
+
+    /// Squares of one layer and of twenty, at ten doses each.
+    fn layers_of(share: f64, spread: f64, noise: &mut SplitMix) -> Vec<WidthPoint> {
+        let truth = truth(8466.667, 100.0, 0.1);
+        let mut points = Vec::new();
+        for layers in [1, 20] {
+            for i in 1..=10 {
+                let dose = Dose::from_mj_per_cm2(50.0 * f64::from(i));
+                let counts = dose.mj_per_cm2() * (1.0 + share * (twenty(layers) - 1.0));
+                let um = truth.width(Dose::from_mj_per_cm2(counts)).um() + spread * noise.normal();
+                let (feature_size, width) = (truth.feature_size, Length::from_um(um));
+                points.push(WidthPoint { feature_size, dose, width, direction: None, layers });
+            }
+        }
+        points
+    }
+
+    /// Layers of 100 um and light that fades over 211 um, layer by layer.
+    fn twenty(layers: u32) -> f64 {
+        (0..layers).map(|above| (-100.0 * f64::from(above) / 211.0).exp()).sum()
+    }
+
+    #[test]
+    fn the_share_of_doses_above_comes_back() {
+        let mut noise = SplitMix(20);
+        let exact = fit_many_layers(&layers_of(0.2, 0.0, &mut noise), twenty).unwrap().unwrap();
+        assert!((exact.share[0] - 0.2).abs() < 1e-6 && exact.points == 20, "{exact:?}");
+        let fits = (0..400).map(|_| {
+            let fit = fit_many_layers(&layers_of(0.2, 1.5, &mut noise), twenty)?;
+            Ok(fit.unwrap())
+        });
+        let [held] = share_held(fits, |fit| [fit.share[1] <= 0.2 && 0.2 <= fit.share[2]]);
+        // 95% +- 3.3% is three standard deviations of 400 trials.
+        assert!((held - 0.95).abs() < 0.033, "{held}");
+    }
+
+    #[test]
+    fn squares_of_many_layers_have_one_size_and_no_direction() {
+        let mut noise = SplitMix(21);
+        let points = layers_of(0.2, 0.5, &mut noise);
+        assert_eq!(fit_many_layers(&points[..10], twenty), Ok(None));
+        assert_eq!(fit_widths(&points).unwrap()[0].points, 10);
+        let mut sizes = points.clone();
+        sizes[15].feature_size = Length::from_um(500.0);
+        assert_eq!(fit_many_layers(&sizes, twenty), Err(FitError::LayersOfSeveral));
+        let mut along = points.clone();
+        along[15].direction = Some(ScanDirection::Along);
+        assert_eq!(fit_many_layers(&along, twenty), Err(FitError::LayersOfSeveral));
+        let few = fit_many_layers(&points[8..], twenty).unwrap_err().to_string();
+        assert!(few.contains("2 points are too few"), "{few}");
+    }
+
+    #[test]
+    fn directions_have_lines_of_their_own() {
+        let truths = [truth(8000.0, 140.0, 0.08), truth(8000.0, 90.0, 0.2)];
+        let directions = ScanDirection::ALL;
+        let of = |k: usize| {
+            let points = points(truths[k], || 0.0).into_iter();
+            points.map(move |point| WidthPoint { direction: Some(directions[k]), ..point })
+        };
+        let fits = fit_widths(&of(1).chain(of(0)).collect::<Vec<_>>()).unwrap();
+        for ((fit, truth), direction) in fits.iter().zip(truths).zip(directions) {
+            assert_eq!(fit.direction, Some(direction));
+            let critical = truth.critical_dose.mj_per_cm2();
+            assert!((fit.critical_dose.value.mj_per_cm2() - critical).abs() < 1e-9);
+        }
     }
 
     #[test]

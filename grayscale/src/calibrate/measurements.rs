@@ -45,6 +45,10 @@ pub struct WidthPoint {
     pub dose: Dose,
     /// The distance of the edges outside the image.
     pub width: Length,
+    /// The direction of the width, if it was measured along and across the scan apart.
+    pub direction: Option<ScanDirection>,
+    /// How many layers the square has, one on another.
+    pub layers: u32,
 }
 
 /// A measured cure depth or cure width of a resin of some composition, or under some lamp.
@@ -167,6 +171,7 @@ const WIDTH: &str = "width_um";
 const DIRECTION: &str = "direction";
 const KIND: &str = "kind";
 const ABSORBER: &str = "uv_absorber_g_per_100g";
+const LAYERS: &str = "layers";
 const INITIATOR: &str = "photoinitiator_g_per_100g";
 
 /// Reads cure depths from a table of `dose_mj_per_cm2` or, under a light, `exposure_ms`;
@@ -234,7 +239,8 @@ pub fn lamp_points(table: &CsvTable) -> Result<Measured<LampPoint>, DataError> {
 
 /// Reads cure widths from a table of `dose_mj_per_cm2` or, under a light, `exposure_ms`;
 /// `feature_px` or `feature_um`, the squares' side in the image; and `cured_um`, their side after
-/// curing, or `width_um`, the cure width itself (002 eq. 60). Squares that did not grow count, as
+/// curing, or `width_um`, the cure width itself (002 eq. 60). `direction`, `across` or `along`, is that
+/// of the width, and `layers` says how many layers a square has. Squares that did not grow count, as
 /// do squares that are smaller than their image by an error of measurement. Squares of a side of
 /// zero or below were washed away.
 ///
@@ -245,7 +251,8 @@ pub fn width_points(
     light: Option<Intensity>,
     dpi: Dpi,
 ) -> Result<Measured<WidthPoint>, DataError> {
-    check_columns(table, &[SIZE_PIXELS, SIZE, DOSE, EXPOSURE, CURED, WIDTH])?;
+    check_columns(table, &[SIZE_PIXELS, SIZE, DOSE, EXPOSURE, CURED, WIDTH, DIRECTION, LAYERS])?;
+    let [direction, layers] = [DIRECTION, LAYERS].map(|name| Column::find(table, name));
     let dose = DoseColumn::find(table, light)?;
     let (size, in_pixels) = Column::either(table, SIZE_PIXELS, SIZE)?;
     let (width, is_side) = Column::either(table, CURED, WIDTH)?;
@@ -262,7 +269,24 @@ pub fn width_points(
         }
         // 002 eq. 60: both edges moved.
         let width = if is_side { cure_width_of_square(of_row, side) } else { of_row };
-        Ok(RowContent::Point(WidthPoint { feature_size: side.to_whole_nm(), dose, width }))
+        let layers = match layers {
+            None => 1,
+            Some(layers) => match layers.text(row) {
+                "" => 1,
+                text => {
+                    let count = text.parse().ok().filter(|count| (1..=1_000_000).contains(count));
+                    count.ok_or_else(|| layers.impossible(row, "a number of layers from 1"))?
+                }
+            },
+        };
+        let direction = match direction {
+            Some(direction) if !direction.text(row).is_empty() => {
+                Some(direction_of(direction, row)?)
+            }
+            _ => None,
+        };
+        let feature_size = side.to_whole_nm();
+        Ok(RowContent::Point(WidthPoint { feature_size, dose, width, direction, layers }))
     })
 }
 
@@ -377,7 +401,7 @@ fn law_columns(
         (Some(absorber), Some(initiator)) => (absorber, initiator),
     };
     match (only(absorber)?, only(initiator)?) {
-        // 002 section 3.4.8 d: what follows from both together is not known.
+        // 002 section 3.4.8 d: effects of both together are not known.
         (None, None) => Err(DataError::BothChange(ABSORBER, INITIATOR)),
         (_, held @ Some(_)) => Ok((LawVariable::UvAbsorber, absorber, held)),
         (held, None) => Ok((LawVariable::Photoinitiator, initiator, held)),
@@ -408,8 +432,7 @@ pub fn line_points(
         if !LENGTHS.contains(&drawn.um()) {
             return Err(size.impossible(row, "a width from 0.001 um to 1 m"));
         }
-        let wrong = |_| direction.impossible(row, "`across` or `along`");
-        let direction: ScanDirection = direction.text(row).parse().map_err(wrong)?;
+        let direction = direction_of(direction, row)?;
         let kind: LineKind =
             kind.text(row).parse().map_err(|_| kind.impossible(row, "`line` or `gap`"))?;
         let dose = dose.of(row)?;
@@ -419,6 +442,10 @@ pub fn line_points(
             Some(cured) => RowContent::Point(LinePoint { direction, kind, drawn, dose, cured }),
         })
     })
+}
+
+fn direction_of(column: Column, row: &TableRow) -> Result<ScanDirection, DataError> {
+    column.text(row).parse().map_err(|_| column.impossible(row, "`across` or `along`"))
 }
 
 /// The content of a row.
@@ -502,6 +529,24 @@ mod tests {
         let by_width = widths("feature_um,dose_mj_per_cm2,width_um\n423,200,13.3\n").unwrap();
         assert_eq!(by_width.points[0].feature_size.um(), 423.0);
         assert_eq!(by_width.points[0].width.um(), 13.3);
+    }
+
+    #[test]
+    fn squares_may_have_directions_and_layers() {
+        let head = "feature_um,dose_mj_per_cm2,width_um,direction,layers\n";
+        let read = |row: &str| widths(&format!("{head}{row}\n"));
+        let point = read("500,100,3,along,").unwrap().points[0];
+        assert_eq!((point.direction, point.layers), (Some(ScanDirection::Along), 1));
+        let point = read("500,100,3,,20").unwrap().points[0];
+        assert_eq!((point.direction, point.layers), (None, 20));
+        for (row, words) in [
+            ("500,100,3,up,1", "column direction: up is not `across` or `along`"),
+            ("500,100,3,,0", "column layers: 0 is not a number of layers"),
+            ("500,100,3,,1.5", "column layers: 1.5 is not"),
+        ] {
+            let said = read(row).unwrap_err().to_string();
+            assert!(said.contains(words), "{said}");
+        }
     }
 
     #[test]

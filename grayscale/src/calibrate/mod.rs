@@ -55,7 +55,7 @@ pub use fit_lamp::{LampFit, fit_lamp};
 pub use fit_law::{LawCurve, LawFit, LawLine, fit_law, law_numbers};
 pub use fit_scan::{LineKind, LinesOf, ScanDirection, ScanFit, fit_scan};
 pub use fit_two_depth::{TwoDepthFit, fit_two_depth};
-pub use fit_widths::{WidthFit, fit_widths};
+pub use fit_widths::{ManyLayersFit, WidthFit, fit_many_layers, fit_widths};
 pub use measurements::{
     DataError, DepthPoint, LampPoint, LawPoint, LawTable, LinePoint, Measured, WidthPoint,
     depth_points, lamp_points, law_points, line_points, width_points,
@@ -198,6 +198,12 @@ pub enum FitError {
          higher doses"
     )]
     LastDoseAlone,
+    /// Squares of many layers are of several kinds.
+    #[error(
+        "squares of several layers must have one size and no direction: fit others in a table of \
+         their own"
+    )]
+    LayersOfSeveral,
     /// The points leave a line open.
     #[error(
         "the points do not show how the working curve changes: measure several doses at each level"
@@ -370,6 +376,8 @@ mod tests {
                 feature_size: Length::from_um(size.into()),
                 dose: Dose::from_mj_per_cm2(mj),
                 width: Length::from_um(um),
+                direction: None,
+                layers: 1,
             };
             let widths: Vec<_> = rows.iter().map(width).collect();
             let mut found = Vec::new();

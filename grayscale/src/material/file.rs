@@ -1,6 +1,6 @@
 //! Reads and writes material files, and lists the built-in ones.
 
-use lamp_stack::{Builtin, CatalogueError, Catalogued, one_line};
+use lamp_stack::{Builtin, CatalogueError, Catalogued, Length, one_line};
 use thiserror::Error;
 
 use super::{LawVariable, Material};
@@ -25,6 +25,15 @@ pub enum MaterialError {
     /// The exponent of the light over the gray level is not above zero.
     #[error("gamma.value must be above zero")]
     Gamma,
+    /// Cure widths of one direction only.
+    #[error("cure-width has one direction: give `across` and `along`, or none")]
+    OneDirection,
+    /// The share of doses above is below zero.
+    #[error("many-layers.value must be zero or more")]
+    ManyLayers,
+    /// Nothing says how doses of the layers above fade.
+    #[error("many-layers needs to know how light fades: add [working-curve]")]
+    NoFadingOfLayers,
     /// A constant is infinite or not a number.
     #[error("constants.{0}.value must be a finite number")]
     NoNumber(String),
@@ -109,7 +118,9 @@ impl Catalogued for Material {
         self.gray_curve()?;
         self.gray_lines()?;
         self.two_depth()?;
-        self.cure_width()?;
+        self.cure_widths()?;
+        // Any thickness shows whether the share and the depth are possible.
+        self.many_layers(Length::from_um(100.0))?;
         self.check_laws()?;
         self.kinetics()?;
         Ok(())
@@ -118,8 +129,6 @@ impl Catalogued for Material {
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::Length;
-
     use super::*;
     use crate::material::Given;
 
@@ -231,11 +240,12 @@ source = "notebook, page 3"
             )
         };
         let read = |sizes: &[String]| Material::from_toml(&(WHOLE.to_owned() + &sizes.concat()));
-        assert_eq!(read(&[]).unwrap().cure_width(), Ok(None));
+        assert_eq!(read(&[]).unwrap().cure_widths(), Ok(None));
         let two = [size("7.62 mm", "80 mJ/cm2"), size("0.4233 mm", "200 mJ/cm2")];
         let material = read(&two).unwrap();
         assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material.clone()));
-        let model = material.cure_width().unwrap().unwrap();
+        let [model, along] = material.cure_widths().unwrap().unwrap();
+        assert_eq!(model, along);
         assert_eq!(model.lines()[0].feature_size.um(), 423.3);
         assert_eq!(model.lines()[1].critical_dose.mj_per_cm2(), 80.0);
         let refused = |sizes: &[String]| read(sizes).unwrap_err().to_string();
@@ -248,6 +258,37 @@ source = "notebook, page 3"
             slip.contains("cure-width[0].sensitivity") && slip.contains("a width sensitivity"),
             "{slip}"
         );
+    }
+
+    #[test]
+    fn cure_widths_may_have_two_directions() {
+        let size = |direction: &str, critical: f64| {
+            format!(
+                "[[cure-width]]\nfeature-size = \"8 mm\"\ndirection = \"{direction}\"\n\
+                 critical-dose = {{ value = \"{critical} mJ/cm2\", source = \"a\" }}\n\
+                 sensitivity = {{ value = \"0.2 um/(mJ/cm2)\", source = \"a\" }}\n"
+            )
+        };
+        let read = |sizes: String| Material::from_toml(&(WHOLE.to_owned() + &sizes));
+        let material = read(size("across", 60.0) + &size("along", 50.0)).unwrap();
+        assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material.clone()));
+        let widths = material.cure_widths().unwrap().unwrap();
+        let criticals = widths.map(|width| width.lines()[0].critical_dose.mj_per_cm2());
+        assert_eq!(criticals, [60.0, 50.0]);
+        let one = read(size("across", 60.0)).unwrap_err();
+        assert_eq!(one, CatalogueError::Check(MaterialError::OneDirection));
+    }
+
+    #[test]
+    fn many_layers_count_by_their_share() {
+        let with = |text: &str| Material::from_toml(&format!("{WHOLE}{text}"));
+        let material = with("[many-layers]\nvalue = 0.25\nsource = \"a\"\n").unwrap();
+        // 1/(1 - exp(-100/140)) is 1.959024, by Python.
+        let factor = material.many_layers(Length::from_um(100.0)).unwrap();
+        assert!((factor - 1.239_756).abs() < 1e-6, "{factor}");
+        assert_eq!(with("").unwrap().many_layers(Length::from_um(100.0)), Ok(1.0));
+        let wrong = with("[many-layers]\nvalue = -0.1\nsource = \"a\"\n").unwrap_err();
+        assert_eq!(wrong, CatalogueError::Check(MaterialError::ManyLayers));
     }
 
     #[test]

@@ -195,7 +195,8 @@ mod tests {
             Material::from_toml(&format!("{head}{text}[[law]]\nover = \"lamp\"\n{ends}")).unwrap()
         };
         let lines = |material: Material, w: f64| {
-            material.under_lamp(watts(w)).unwrap().cure_width().unwrap().unwrap().lines().to_vec()
+            let under = material.under_lamp(watts(w)).unwrap();
+            under.cure_widths().unwrap().unwrap()[0].lines().to_vec()
         };
         // Half of the way: 1/D^w is 6, and E^w 80.
         let whole = read(&format!("{light}{}", sizes.concat()));

@@ -130,7 +130,7 @@ pub struct BestBond {
     pub at: f64,
     /// The dose that cures the depth.
     pub dose: Dose,
-    /// How far that dose moves edges outwards.
+    /// The distance by which that dose moves edges outwards.
     pub growth: Length,
     /// The depth that cures before edges grow (002 eq. 61).
     pub broadening_depth: Length,
@@ -164,6 +164,7 @@ impl LawNumbers {
             }),
             width: width.map(|(a, b)| WidthNumbers {
                 feature_size: a.feature_size,
+                direction: a.direction,
                 critical_dose: between(&a.critical_dose, &b.critical_dose, by_dose, false, &note),
                 sensitivity: between(&a.sensitivity, &b.sensitivity, by_inverse, true, &note),
                 measured: a.measured.clone(),
@@ -219,9 +220,9 @@ impl LawNumbers {
             end.curve().transpose().map_err(model)?;
             end.cure_width().transpose().map_err(model)?;
         }
-        let size = |end: &LawEnd| end.width.as_ref().map(|width| width.feature_size);
+        let size = |end: &LawEnd| end.width.as_ref().map(|it| (it.feature_size, it.direction));
         if size(least) != size(most) {
-            return fail("both ends must be of squares of one feature-size");
+            return fail("both ends must be of squares of one feature-size, measured alike");
         }
         let ranges = [least, most].map(|end| {
             let depth = end.depth.as_ref().and_then(|it| it.measured.as_ref());
@@ -328,7 +329,7 @@ impl Material {
         })
     }
 
-    /// Returns the composition, among those that laws give, whose edges grow least by a dose that cures
+    /// Returns the composition, among all that laws give, whose edges grow least by a dose that cures
     /// a depth: a bond of `k` layers takes `k` times their thickness. Where several have no growth, it
     /// is the one of the greatest broadening depth (002 section 3.4.3, eq. 61, figures 89 and 94).
     ///
@@ -451,7 +452,7 @@ mod tests {
         let curve = made.working_curve().unwrap().unwrap();
         near(curve.penetration_depth().um(), 1000.0 / 2.6);
         near(curve.critical_dose().mj_per_cm2(), 65.0);
-        let width = made.cure_width().unwrap().unwrap().lines()[0];
+        let width = made.cure_widths().unwrap().unwrap()[0].lines()[0];
         near(width.sensitivity.um_per_mj_per_cm2(), 1.0 / 7.5);
         near(width.critical_dose.mj_per_cm2(), 120.0);
         // Three quarters of 2 and a quarter of 7 mJ/cm2.

@@ -35,10 +35,11 @@ pub use law::{BestBond, LawEnd, LawError, LawNumbers, LawVariable};
 pub use measured::{GivenRange, MeasuredRange};
 pub use number::{Constant, Given, GivenDepths, GivenLine, GivenNumber};
 
+use crate::calibrate::ScanDirection;
 use crate::resin::{
-    CureModel, CureWidth, DepthRange, Dose, EdgeLight, FadingLight, GrayCurve, Intensity,
-    IntensityLines, ModelError, Resin, Spread, StraightLine, TwoDepth, WidthLine, WidthSensitivity,
-    WorkingCurve,
+    CureModel, CureWidth, DepthRange, Dose, EdgeLight, FadingLight, GrayCurve, GrayLevel,
+    Intensity, IntensityLines, ModelError, Resin, Spread, StraightLine, TwoDepth, WidthLine,
+    WidthSensitivity, WorkingCurve, summed_doses,
 };
 
 /// The known numbers of a resin; unknown ones are absent. The default is empty and has no
@@ -71,6 +72,9 @@ pub struct Material {
     /// The cure width of features of several sizes (002 section 3.4.4).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cure_width: Vec<WidthNumbers>,
+    /// The share of the doses of the layers above that counts for the cure width, in parts of many layers
+    /// (002 section 3.4.8 a).
+    pub many_layers: Option<GivenNumber>,
     /// How its numbers follow its composition (002 sections 3.4.6 and 3.4.7), and its cure width the
     /// lamp (section 3.4.5).
     #[serde(default, rename = "law", skip_serializing_if = "Vec::is_empty")]
@@ -158,6 +162,10 @@ pub struct WidthNumbers {
     /// The side of the measured squares.
     #[serde(with = "number::written")]
     pub feature_size: Length,
+    /// The direction in which it was measured, if edges grow differently along and across the scan (002
+    /// section 3.4.8 b).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<ScanDirection>,
     /// `E_c^w`.
     pub critical_dose: Given<Dose>,
     /// `D_p^w`.
@@ -297,21 +305,60 @@ impl Material {
         self.two_depth.as_ref().map(model).transpose().map_err(of("two-depth"))
     }
 
-    /// Returns the cure width, if there is one.
+    /// Returns the cure widths along x and along y, across the scan and along it, if there are some. Both
+    /// are the same unless they were measured apart.
     ///
     /// # Errors
-    /// Returns an error if a number is not above zero, or a size occurs twice.
-    pub fn cure_width(&self) -> Result<Option<CureWidth>, MaterialError> {
+    /// Returns an error if a number is not above zero, a size occurs twice, or one direction is missing.
+    pub fn cure_widths(&self) -> Result<Option<[CureWidth; 2]>, MaterialError> {
         if self.cure_width.is_empty() {
             return Ok(None);
+        }
+        let [x, y] = ScanDirection::ALL.map(|direction| self.cure_width_of(direction));
+        Ok(Some([x?, y?]))
+    }
+
+    fn cure_width_of(&self, direction: ScanDirection) -> Result<CureWidth, MaterialError> {
+        let is_of = |it: &&WidthNumbers| it.direction.is_none_or(|of| of == direction);
+        if !self.cure_width.iter().any(|it| is_of(&it)) {
+            return Err(MaterialError::OneDirection);
         }
         let line = |numbers: &WidthNumbers| WidthLine {
             feature_size: numbers.feature_size,
             critical_dose: numbers.critical_dose.value,
             sensitivity: numbers.sensitivity.value,
         };
-        let lines = self.cure_width.iter().map(line).collect();
-        CureWidth::new(lines).map(Some).map_err(of("cure-width"))
+        let lines = self.cure_width.iter().filter(is_of).map(line).collect();
+        CureWidth::new(lines).map_err(of("cure-width"))
+    }
+
+    /// Returns how many times its own dose counts for the cure width of a layer with many layers above
+    /// it: their doses fade by `q = exp(-thickness/D_p)` a layer, and sum to `1/(1 - q)` (002 section
+    /// 3.4.8 a, as `lamp cure` adds doses up), of which a share counts. 1 if the material does not say it.
+    ///
+    /// # Errors
+    /// Returns an error if the share is below zero, or if no curve says how light fades.
+    pub fn many_layers(&self, thickness: Length) -> Result<f64, MaterialError> {
+        let Some(share) = &self.many_layers else { return Ok(1.0) };
+        if !(share.value >= 0.0 && share.value.is_finite()) {
+            return Err(MaterialError::ManyLayers);
+        }
+        let depth = self.white_depth()?.ok_or(MaterialError::NoFadingOfLayers)?;
+        Ok(1.0 + share.value * (summed_doses(thickness, depth, None) - 1.0))
+    }
+
+    /// Returns the depth over which white fades by e, by the model that [`Self::fading`] takes.
+    ///
+    /// # Errors
+    /// Returns an error if numbers are impossible.
+    pub fn white_depth(&self) -> Result<Option<Length>, MaterialError> {
+        if let Some(curve) = self.gray_curve()? {
+            return Ok(Some(curve.at(GrayLevel::WHITE).penetration_depth()));
+        }
+        if let (Some(lines), Some(light)) = (self.gray_lines()?, self.light()?) {
+            return Ok(Some(lines.under(light).at(GrayLevel::WHITE).penetration_depth()));
+        }
+        Ok(self.working_curve()?.map(|curve| curve.penetration_depth()))
     }
 
     /// Returns how its light fades, for doses that add up, by the most detailed model: the curves

@@ -21,10 +21,44 @@ pub fn broadening_depth(depth: &dyn CureModel, width_critical: Dose) -> Length {
     depth.depth(width_critical)
 }
 
+/// Returns how many times its own dose the lowest of `layers` equal layers gets at its top, light fading
+/// by e over `penetration_depth`: `1 + q + q² + ...`, with `q = exp(-thickness/D_p)`, as `lamp cure` adds
+/// doses up (002 section 3.4.8 a). `None` is any number of layers.
+pub fn summed_doses(thickness: Length, penetration_depth: Length, layers: Option<u32>) -> f64 {
+    let fades = -thickness.um() / penetration_depth.um();
+    // expm1 keeps the digits of layers that are thin for the light.
+    let all = layers.map_or(1.0, |layers| -(fades * f64::from(layers)).exp_m1());
+    all / -fades.exp_m1()
+}
+
 #[cfg(test)]
 mod tests {
+    use lamp_stack::Catalogued;
+
     use super::*;
+    use crate::SummedLine;
+    use crate::material::Material;
     use crate::resin::WorkingCurve;
+
+    #[test]
+    fn doses_of_layers_sum_as_in_lamp_cure() {
+        let material = Material::builtin("lamp-suspension").unwrap();
+        let (thickness, depth) = (Length::from_um(100.0), material.white_depth().unwrap().unwrap());
+        let time = material.resin().unwrap().exposure_time(thickness, 1.0).unwrap();
+        for layers in [1, 2, 5, 30] {
+            let mut line = SummedLine::new(material.fading().unwrap(), 1);
+            for layer in 0..layers {
+                let bottom = Length::from_um(1000.0 + 100.0 * f64::from(layer));
+                line.expose(vec![(0, 1, 255)], bottom, thickness, time);
+            }
+            // White just cures the lowest layer; the sum cures D_p ln of itself deeper.
+            let deeper = 1000.0 - line.cured(0.0)[0][0][0];
+            let wanted = depth.um() * summed_doses(thickness, depth, Some(layers)).ln();
+            assert!((deeper - wanted).abs() < 2e-3, "{layers}: {deeper} for {wanted}");
+        }
+        let many = summed_doses(thickness, depth, Some(1000));
+        assert!((many / summed_doses(thickness, depth, None) - 1.0).abs() < 1e-12);
+    }
 
     #[test]
     fn equation_60() {

@@ -21,7 +21,7 @@ mod working_curve;
 use lamp_stack::{DepthLevels, Length};
 
 pub use beam::GaussianBeam;
-pub use broadening::{broadening_depth, cure_width_of_square};
+pub use broadening::{broadening_depth, cure_width_of_square, summed_doses};
 pub use composition::{Absorber, Inhibition, Suspension, refractive_contrast};
 pub use cure_width::{CureWidth, WidthLine};
 pub use edge_light::EdgeLight;

@@ -65,6 +65,8 @@ struct Group {
     of: &'static str,
     /// Its value.
     at: f64,
+    /// Direction of the widths, `across` or `along` the scan; null without one.
+    direction: Option<&'static str>,
     /// The number of points.
     points: usize,
     /// Share of their scatter that their own curve explains; null without such a curve.
@@ -145,7 +147,20 @@ impl EstimateTable {
 
     /// Begins a group of points, for the answer.
     pub(super) fn group(&mut self, of: &'static str, at: f64, points: usize, r2: Option<f64>) {
-        self.answer.groups.push(Group { of, at, points, r2, parameters: Vec::new() });
+        self.answer.groups.push(Group {
+            of,
+            at,
+            direction: None,
+            points,
+            r2,
+            parameters: Vec::new(),
+        });
+    }
+
+    /// Adds the direction of the widths of the last group, for the answer.
+    pub(super) fn direction_of_group(&mut self, direction: Option<&'static str>) {
+        let group = self.answer.groups.last_mut().expect("a group was begun");
+        group.direction = direction;
     }
 
     /// Adds a number of the last group with its interval. The table calls it `name`, with `at` behind.

@@ -3,16 +3,19 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_grayscale::calibrate::{Estimate, WidthFit, WidthPoint, fit_widths, width_points};
+use lamp_grayscale::calibrate::{
+    Estimate, ManyLayersFit, ScanDirection, WidthFit, WidthPoint, fit_many_layers, fit_widths,
+    width_points,
+};
 use lamp_grayscale::exposure::MeasuredDoses;
-use lamp_grayscale::material::{Material, MaterialError};
-use lamp_grayscale::resin::{CureModel, Dose, broadening_depth};
+use lamp_grayscale::material::{GivenNumber, Material, MaterialError};
+use lamp_grayscale::resin::{CureModel, Dose, broadening_depth, summed_doses};
 use lamp_pipeline::documents::document;
-use lamp_stack::{Dpi, to_nm};
+use lamp_stack::{Dpi, Length, round_significant, to_nm};
 
 use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
-use crate::args::options::Common;
+use crate::args::options::{Common, parse_thickness};
 use crate::exit::Exit;
 use crate::terminal::progress::Progress;
 use lamp_plots::{Plot, PlotAxis, Series, highest};
@@ -24,6 +27,10 @@ use lamp_plots::{Plot, PlotAxis, Series, highest};
 /// curing; or width_um, the distance of each edge outside its image). Include squares no larger
 /// than their image: they show the dose at which squares start to grow. Leave out only squares that
 /// were washed away, or enter 0 as their side. lamp target squares writes a file to fill in.
+///
+/// With a column direction (across or along the scan, the direction of the width), each direction has
+/// widths of its own. With a column layers, squares of several layers show how much the doses of the
+/// layers above count.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -41,6 +48,10 @@ pub(super) struct WidthArgs {
     /// --material]
     #[arg(long, value_name = "MATERIAL")]
     depth_material: Option<PathBuf>,
+
+    /// Thickness of the layers, if squares have several
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    thickness: Option<Length>,
 }
 
 pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
@@ -60,6 +71,8 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     let measured = width_points(&table, files.light(base.as_ref())?, args.dpi);
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let fits = fit_widths(&measured.points).map_err(|error| at_place(error.into()))?;
+    let many = many_layers(args.thickness, of_depths, &measured.points);
+    let many = many.map_err(|error| at_place(error))?;
     let progress = Progress::new("calibrate", common, true);
     if depths.is_none() {
         progress.say(
@@ -73,6 +86,11 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
         // Broadening depths are cure depths at these doses.
         doses.iter().for_each(|doses| doses.see(fit.critical_dose.value));
     }
+    if let Some(fit) = &many {
+        fitted.line("", &[]);
+        fitted.heads();
+        fitted.numbers("share of doses above", "1", fit.share);
+    }
     let doubt = doses.and_then(|doses| doses.doubt("broadening depths"));
     doubt.iter().for_each(|doubt| progress.say(doubt));
     let title = format!("Cure width: {}", files.source_name());
@@ -81,8 +99,38 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
         for fit in &fits {
             add_to(material, fit, &files.source(fit.points));
         }
+        if let Some(fit) = &many {
+            let [value, low, high] = fit.share;
+            material.many_layers = Some(GivenNumber {
+                value: round_significant(value, 6),
+                plus_minus: Some(round_significant((high - value).max(value - low), 3)),
+                source: files.source(fit.points),
+            });
+        }
     };
     files.finish(base, add, &[plot], &fitted, common)
+}
+
+/// Fits how much the doses of the layers above count, if squares have several layers.
+fn many_layers(
+    thickness: Option<Length>,
+    material: Option<&Material>,
+    points: &[WidthPoint],
+) -> Result<Option<ManyLayersFit>, Exit> {
+    if points.iter().all(|point| point.layers == 1) {
+        return Ok(None);
+    }
+    let depth = match material {
+        Some(material) => material.white_depth().map_err(anyhow::Error::new)?,
+        None => None,
+    };
+    let (Some(thickness), Some(depth)) = (thickness, depth) else {
+        return Err(Exit::usage(
+            "squares have several layers: give --thickness, and a material with a working curve as \
+             --depth-material",
+        ));
+    };
+    Ok(fit_many_layers(points, |layers| summed_doses(thickness, depth, Some(layers)))?)
 }
 
 /// How deep full white cures a material, where that is known.
@@ -100,6 +148,7 @@ fn write(table: &mut EstimateTable, fit: &WidthFit, dpi: Dpi, depths: Option<&dy
     let (size, below) = (size_name(fit, dpi), fit.below);
     let below = if below > 0 { format!(" ({below} up to Ec^w)") } else { String::new() };
     table.group("feature_um", to_nm(fit.feature_size.mm()) * 1000.0, fit.points, Some(fit.r2));
+    table.direction_of_group(fit.direction.map(ScanDirection::name));
     table.line(&format!("\n{size}: {} points{below}", fit.points), &[]);
     table.heads();
     table.estimate_of_group("Ec^w", "", &fit.critical_dose);
@@ -117,14 +166,22 @@ fn write(table: &mut EstimateTable, fit: &WidthFit, dpi: Dpi, depths: Option<&dy
 fn size_name(fit: &WidthFit, dpi: Dpi) -> String {
     let two = |number: f64| (number * 100.0).round() / 100.0;
     let size = fit.feature_size;
-    format!("{} px ({} um)", two(size.pixels(dpi)), two(size.um()))
+    let direction = fit.direction.map(|direction| format!(", {direction} the scan"));
+    let direction = direction.unwrap_or_default();
+    format!("{} px ({} um){direction}", two(size.pixels(dpi)), two(size.um()))
 }
 
 /// Adds a size's numbers, and replaces the material's numbers of that size.
 fn add_to(material: &mut Material, fit: &WidthFit, source: &str) {
     let um = fit.feature_size.um();
+    // Widths of one direction replace widths of all directions, and the reverse.
+    let other = |direction: Option<ScanDirection>| {
+        direction.is_some() && fit.direction.is_some() && direction != fit.direction
+    };
     // Sizes are given to the nanometer.
-    material.cure_width.retain(|size| (size.feature_size.um() - um).abs() > 1e-3);
+    material
+        .cure_width
+        .retain(|size| (size.feature_size.um() - um).abs() > 1e-3 || other(size.direction));
     material.cure_width.push(fit.numbers(source));
     material.cure_width.sort_by(|a, b| a.feature_size.um().total_cmp(&b.feature_size.um()));
 }
@@ -143,7 +200,10 @@ fn plot(title: String, fits: &[WidthFit], points: &[WidthPoint], dpi: Dpi) -> Pl
 }
 
 fn series(fit: &WidthFit, points: &[WidthPoint], doses: &[Dose], dpi: Dpi) -> Series {
-    let of_size = points.iter().filter(|point| point.feature_size == fit.feature_size);
+    let of_size = points.iter().filter(|point| {
+        point.layers == 1
+            && (point.feature_size, point.direction) == (fit.feature_size, fit.direction)
+    });
     let start = fit.critical_dose.low.mj_per_cm2();
     let above = |from: f64| doses.iter().filter(move |dose| dose.mj_per_cm2() > from);
     let band = above(start).map(|&dose| {

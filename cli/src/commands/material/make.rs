@@ -155,6 +155,7 @@ fn left_out(measured: &Material, over: LawVariable) -> Vec<String> {
         ("dimmed-lamp", measured.dimmed_lamp.is_some()),
         ("two-depth", measured.two_depth.is_some()),
         ("kinetics", measured.kinetics.is_some()),
+        ("many-layers", measured.many_layers.is_some()),
         ("the other law", measured.laws.len() > 1),
         (
             "critical-dose of spread",
