@@ -195,6 +195,7 @@ fn materials() -> impl Strategy<Value = Material> {
                 spread,
                 gamma,
                 laws: vec![law],
+                overcure: None,
                 many_layers: gamma.clone(),
                 working_curve: Some(curve),
                 gray,

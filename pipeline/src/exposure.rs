@@ -13,7 +13,7 @@ use crate::documents::{
     recorded_name, without_digest, word_of_text,
 };
 use crate::error::{Error, ErrorKind};
-use crate::words::{optional, path, text};
+use crate::words::{optional, path};
 
 /// A table has a row for each thickness.
 const MAX_TABLE_BYTES: u64 = 1 << 20;
@@ -27,9 +27,9 @@ pub enum ExposureSettings {
         /// A built-in one's name, or a file.
         #[serde(with = "path")]
         material: PathBuf,
-        /// Depth that full white cures, in layers.
-        #[serde(with = "text")]
-        overcure: f64,
+        /// Depth that full white cures, in layers; `None` is the material's, or 1.
+        #[serde(with = "optional", default, skip_serializing_if = "Option::is_none")]
+        overcure: Option<f64>,
         /// The lamp as it is now; `None` is the material's.
         #[serde(with = "optional", default, skip_serializing_if = "Option::is_none")]
         lamp_intensity: Option<LampLight>,
@@ -60,8 +60,13 @@ pub struct RecordedExposure {
 }
 
 impl ExposureSettings {
-    /// Puts the word of the material or table in the place of its path, as stacks record it.
+    /// Puts the word of the material or table in the place of its path, as stacks record it, and the
+    /// depth that white cures in the place of none.
     pub(crate) fn name(&mut self, exposure: Option<&RecordedExposure>) {
+        let cured = exposure.and_then(|recorded| recorded.exposure.overcure());
+        if let Self::Material { overcure, .. } = self {
+            *overcure = overcure.or(cured);
+        }
         if let (Some(path), Some(RecordedExposure { word, .. })) = (self.path_mut(), exposure) {
             *path = PathBuf::from(word);
         }

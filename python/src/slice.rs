@@ -124,10 +124,6 @@ pub(crate) fn slice(
         usual("thickness", thickness, &["adaptive"]);
         usual("margin", defaults.margin.map(|margin| margin.to_string().into()), &["origin"]);
     }
-    if given.contains_key("material") {
-        // The command line's default, which settings of a material must state.
-        given.entry("overcure").or_insert_with(|| "1".into());
-    }
     if let Some(Value::String(text)) = given.get("scale").map(as_text)
         && let Ok(factors) = parse_scale(&text)
     {

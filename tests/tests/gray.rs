@@ -67,9 +67,9 @@ fn gray_edges_go_through_the_pipeline() {
     }
 
     let gray = "--gray --material lamp-suspension";
-    scratch.run(&format!("slice tower.stl {COARSE} {gray} -o gray.tif")).succeeds_quietly();
+    scratch.run(&format!("slice tower.stl {COARSE} {gray} -o gray.tif")).succeeds();
     let line = format!("slice tower.stl {COARSE} {gray} --antialias -o both.tif");
-    scratch.run(&line).succeeds_quietly();
+    scratch.run(&line).succeeds();
     let (by_depth, both) = (scratch.layers("gray.tif"), scratch.layers("both.tif"));
     for ((both, by_depth), edges) in both.iter().zip(&by_depth).zip(&edges) {
         let [both, by_depth, shares] = [both, by_depth, edges].map(|layer| levels(&layer.image));
@@ -86,7 +86,10 @@ fn gray_edges_go_through_the_pipeline() {
 fn gray_stacks_go_through_the_pipeline() {
     let scratch = with_tower();
     let line = format!("slice tower.stl {COARSE} --gray --material lamp-suspension -o gray.tif");
-    scratch.run(&line).succeeds_quietly();
+    // White that just cures its layer bonds to nothing.
+    let said = scratch.run(&line).succeeds().stderr;
+    let words = "white cures 1 layer deep: no layer bonds to the layer below";
+    assert!(said.contains(words) && said.lines().count() == 1, "{said}");
     let gray = scratch.layers("gray.tif");
     assert_eq!(gray.len(), 190);
     // The cylinder and the cone face no downward slope.
@@ -100,7 +103,7 @@ fn gray_stacks_go_through_the_pipeline() {
     let line = format!(
         "slice tower.stl {COARSE} --gray --material lamp-suspension | fix | dither -q > dots.tif"
     );
-    scratch.run(&line).succeeds_quietly();
+    scratch.run(&line).succeeds();
     let dots = scratch.layers("dots.tif");
     assert!(dots.iter().all(|layer| matches!(*layer.image, Image::Mask(_))));
     assert!(dots.iter().all(|layer| layer.info.exposure_ms == Some(550.942)));
@@ -123,7 +126,7 @@ fn levels_need_no_light() {
     scratch.write("dark.toml", dark.as_bytes());
     for (material, name) in [("lamp-suspension", "bright"), ("dark.toml", "dark")] {
         let line = format!("slice tower.stl {COARSE} --gray --material {material} -o {name}.tif");
-        scratch.run(&line).succeeds_quietly();
+        scratch.run(&line).succeeds();
     }
     let [bright, dark] = ["bright.tif", "dark.tif"].map(|name| scratch.layers(name));
     assert!(bright.iter().any(|layer| matches!(*layer.image, Image::Gray(_))));
@@ -142,7 +145,7 @@ fn a_lamp_that_has_aged_exposes_for_longer() {
     let scratch = with_tower();
     let slice = format!("slice tower.stl {COARSE} --gray --material lamp-suspension");
     let line = format!("{slice} --lamp-intensity 75% -o aged.tif");
-    scratch.run(&line).succeeds_quietly();
+    scratch.run(&line).succeeds();
     let aged = scratch.layers("aged.tif");
     // (137.4 - 0.4 * 18.31) mJ/cm2 exp(400/215.2) at 1.2 W/cm2 (002 eq. 36 and 40).
     let ms = aged[0].info.exposure_ms.unwrap();
@@ -150,10 +153,10 @@ fn a_lamp_that_has_aged_exposes_for_longer() {
     let command = &aged[0].info.stack.as_ref().unwrap().commands[0];
     assert!(command.contains("--lamp-intensity 75%"), "{command}");
     // The recorded command makes the same stack.
-    assert!(scratch.run(command).succeeds_quietly().stdout == scratch.bytes("aged.tif"));
+    assert!(scratch.run(command).succeeds().stdout == scratch.bytes("aged.tif"));
     // A lamp as it was changes nothing.
-    scratch.run(&format!("{slice} -o new.tif")).succeeds_quietly();
-    scratch.run(&format!("{slice} --lamp-intensity 1.6W/cm2 -o same.tif")).succeeds_quietly();
+    scratch.run(&format!("{slice} -o new.tif")).succeeds();
+    scratch.run(&format!("{slice} --lamp-intensity 1.6W/cm2 -o same.tif")).succeeds();
     let [new, same] = ["new.tif", "same.tif"].map(|name| scratch.layers(name));
     assert!(new.iter().zip(&same).all(|(a, b)| a.image == b.image));
     assert_eq!(new[0].info.exposure_ms, same[0].info.exposure_ms);
@@ -185,6 +188,20 @@ fn a_material_alone_says_how_long_white_layers_are_exposed() {
     let words = "layers get 2233 mJ/cm2, but lamp-suspension was measured at 320 to 1920 mJ/cm2";
     assert!(said.contains(words) && said.lines().count() == 1, "{said}");
     let (plain, timed) = (scratch.layers("plain.tif"), scratch.layers("timed.tif"));
+    // A material may state how deep white cures, and the option counts more than that.
+    let stated = String::from_utf8(scratch.bytes("mine.toml")).unwrap()
+        + "\n[overcure]\nvalue = 1.5\nsource = \"a\"\n";
+    scratch.write("stated.toml", stated.as_bytes());
+    for (options, overcure, ms) in [("", "1.5", 1395.5), (" --overcure 1", "1", 550.942)] {
+        let line =
+            format!("slice tower.stl {COARSE} --material stated.toml{options} -o stated.tif");
+        scratch.run(&line).succeeds();
+        let stated = scratch.layers("stated.tif");
+        let found = stated[0].info.exposure_ms.unwrap();
+        assert!((found - ms).abs() < 1.0, "{found}");
+        let command = &stated[0].info.stack.as_ref().unwrap().commands[0];
+        assert!(command.contains(&format!(" --overcure {overcure} ")), "{command}");
+    }
     for (plain, timed) in plain.iter().zip(&timed) {
         assert!(plain.image == timed.image);
         let ms = timed.info.exposure_ms.unwrap();
@@ -228,7 +245,7 @@ fn no_input_is_overwritten() {
     let scratch = with_tower();
     scratch.run("lamp material show lamp-suspension > mine.toml").succeeds();
     let gray = format!("slice tower.stl {COARSE} --gray --material mine.toml");
-    scratch.run(&format!("{gray} -o gray.tif")).succeeds_quietly();
+    scratch.run(&format!("{gray} -o gray.tif")).succeeds();
     let cure = "lamp cure gray.tif --material mine.toml --section y=0mm --part tower.stl";
     for line in [
         "slice tower.stl -o tower.stl",
@@ -288,7 +305,7 @@ fn a_section_shows_what_gray_saves() {
     let placed = "--rotate z:30 --translate 3,-2,5";
     let line =
         format!("slice tower.stl {COARSE} {placed} --gray --material lamp-suspension -o gray.tif");
-    scratch.run(&line).succeeds_quietly();
+    scratch.run(&line).succeeds();
     for section in ["y=-2mm", "x=3.4mm", "y=1in"] {
         let line = format!(
             "lamp cure gray.tif --material lamp-suspension --section {section} --part tower.stl --alone -o s.png"
@@ -319,8 +336,8 @@ fn a_section_shows_what_gray_saves() {
 fn print_through_stays_in_the_part() {
     let scratch = with_tower();
     let slice = "slice tower.stl --dpi 600 --thickness 200um --material lamp-suspension";
-    scratch.run(&format!("{slice} -o white.tif")).succeeds_quietly();
-    scratch.run(&format!("{slice} --gray --print-through -o summed.tif")).succeeds_quietly();
+    scratch.run(&format!("{slice} -o white.tif")).succeeds();
+    scratch.run(&format!("{slice} --gray --print-through -o summed.tif")).succeeds();
     let line = "lamp cure summed.tif --material lamp-suspension --section y=0mm --part tower.stl";
     let ran = scratch.run(&format!("{line} -o s.png")).succeeds_quietly();
     let [white, gray] = areas(&ran.stdout)[..] else { panic!("two panels") };
@@ -340,7 +357,7 @@ fn print_through_stays_in_the_part() {
 
     scratch
         .run(&format!("{slice} --gray --print-through --layers 200..210 -o range.tif"))
-        .succeeds_quietly();
+        .succeeds();
     let range = scratch.layers("range.tif");
     assert!(range.iter().zip(&summed[200..]).all(|(a, b)| a.image == b.image));
     let line = format!("{slice} --gray --print-through --overcure 0.5 -o short.tif");

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_grayscale::material::OVERCURES;
 use lamp_pipeline::exposure::ExposureSettings;
 
 use crate::args::lamp_option::LampOption;
@@ -19,10 +20,10 @@ pub(crate) struct ExposureArgs {
     material: Option<PathBuf>,
 
     /// Depth that full white cures, in layers: 1 cures just the layer, more bonds it to the layer
-    /// below
-    #[arg(long, value_name = "LAYERS", default_value = "1", value_parser = parse_overcure)]
+    /// below [default: the material's, or 1]
+    #[arg(long, value_name = "LAYERS", value_parser = parse_overcure)]
     #[arg(requires = "material", help_heading = EXPOSURE)]
-    overcure: f64,
+    overcure: Option<f64>,
 
     #[command(flatten, next_help_heading = EXPOSURE)]
     lamp: LampOption,
@@ -50,7 +51,7 @@ impl From<&ExposureArgs> for ExposureSettings {
 /// Parses the depth that white cures, in layers.
 pub(crate) fn parse_overcure(text: &str) -> Result<f64, String> {
     match text.parse() {
-        Ok(layers) if (0.1..=100.0).contains(&layers) => Ok(layers),
+        Ok(layers) if OVERCURES.contains(&layers) => Ok(layers),
         _ => Err(format!(
             "`{text}` is not a depth in layers: write a number from 0.1 to 100, such as 1.5"
         )),

@@ -3,7 +3,7 @@
 mod lamp_light;
 mod measured_doses;
 
-use lamp_stack::{DepthLevels, FadingLevels, Length};
+use lamp_stack::{DepthLevels, FadingLevels, Length, round_significant};
 use thiserror::Error;
 
 pub use lamp_light::{LampError, LampLight, LampLightError, parse_lamp_light};
@@ -11,7 +11,9 @@ pub use measured_doses::MeasuredDoses;
 
 use crate::calibrate::ExposureTimes;
 use crate::material::{Material, ResinError};
-use crate::resin::{CureError, CureModel, Dose, ExposureTime, Intensity, depth_levels};
+use crate::resin::{
+    CureError, CureModel, Dose, ExposureTime, Intensity, broadening_depth, depth_levels,
+};
 
 /// The exposure of layers by their thickness.
 ///
@@ -97,7 +99,8 @@ pub enum ExposureError {
 
 impl Exposure {
     /// Creates the exposure in which full white cures `overcure` times a layer's thickness (002
-    /// algorithm 15, line 13), under the material's own lamp or another.
+    /// algorithm 15, line 13), under the material's own lamp or another. `None` is the material's own
+    /// [overcure](Material::overcure).
     ///
     /// # Errors
     /// Returns an error if the material has no cure model, or its numbers are impossible under the
@@ -105,8 +108,12 @@ impl Exposure {
     pub fn by_material(
         material: Material,
         lamp: Option<LampLight>,
-        overcure: f64,
+        overcure: impl Into<Option<f64>>,
     ) -> Result<Self, ExposureError> {
+        let overcure = match overcure.into() {
+            Some(overcure) => overcure,
+            None => material.overcure().map_err(ResinError::from)?,
+        };
         let (material, lamp_doubt) = match lamp {
             Some(lamp) => lamp.material(&material)?,
             None => (material, None),
@@ -128,6 +135,26 @@ impl Exposure {
     pub fn material(&self) -> Option<&Material> {
         match &self.rule {
             Rule::Resin(curing) => Some(&curing.material),
+            Rule::Table(_) => None,
+        }
+    }
+
+    /// Returns how deep full white cures a layer, in layers: the cure depth of its dose over its
+    /// thickness. Above 1 it bonds to the layer below (002 section 3.4.1). A table of times does not
+    /// say it.
+    ///
+    /// # Errors
+    /// Returns an error if the material gives no dose of the layer.
+    pub fn layers_cured(&self, thickness: Length) -> Result<Option<f64>, ExposureError> {
+        let Rule::Resin(curing) = &self.rule else { return Ok(None) };
+        let depth = curing.model.depth(curing.white(thickness)?);
+        Ok(Some(depth.um() / thickness.um()))
+    }
+
+    /// Returns the depth that full white is to cure, in layers, unless a table of times decides.
+    pub fn overcure(&self) -> Option<f64> {
+        match &self.rule {
+            Rule::Resin(curing) => Some(curing.overcure),
             Rule::Table(_) => None,
         }
     }
@@ -196,12 +223,51 @@ impl Exposure {
     }
 
     /// Returns sentences on a lamp, and on doses that layers of these thicknesses take, that the
-    /// material was not measured at.
+    /// material was not measured at; and on layers that do not bond, or whose dose also moves edges.
     pub fn doubts(&self, thicknesses: impl Iterator<Item = Length>) -> Vec<String> {
         let Rule::Resin(curing) = &self.rule else { return Vec::new() };
+        let thicknesses: Vec<_> = thicknesses.collect();
         // Thicknesses without a dose are errors elsewhere.
-        thicknesses.flat_map(|um| curing.white(um)).for_each(|dose| curing.doses.see(dose));
-        curing.lamp_doubt.clone().into_iter().chain(curing.doses.doubt("layers")).collect()
+        thicknesses.iter().flat_map(|um| curing.white(*um)).for_each(|dose| curing.doses.see(dose));
+        let of_doses = curing.lamp_doubt.clone().into_iter().chain(curing.doses.doubt("layers"));
+        of_doses.chain(self.bonding(&thicknesses)).collect()
+    }
+
+    /// Returns sentences on the bonding of layers, and on edges that grow for it (002 section 3.4.1 and
+    /// eq. 61).
+    fn bonding(&self, thicknesses: &[Length]) -> Vec<String> {
+        let Rule::Resin(curing) = &self.rule else { return Vec::new() };
+        let cured = |um: &Length| Some((*um, self.layers_cured(*um).ok()??));
+        let cured: Vec<_> = thicknesses.iter().filter_map(cured).collect();
+        // To rounding, white that just cures a layer reaches its bottom.
+        let loose = cured.iter().filter(|(_, layers)| *layers < 1.0 + 1e-3).count();
+        let least = cured.iter().map(|(_, layers)| *layers).fold(f64::INFINITY, f64::min);
+        let loose = (loose > 0).then(|| {
+            let which = if loose == cured.len() { "no layer bonds" } else { "some layers do not bond" };
+            format!(
+                "white cures {} deep: {which} to the layer below; --overcure 2 cures two layers deep",
+                layers(least)
+            )
+        });
+        // 002 section 3.4.4: widths level off at large sizes.
+        let widths = curing.material.cure_widths().ok().flatten();
+        let lines = widths.iter().flatten().filter_map(|width| width.lines().last().copied());
+        let line = lines
+            .min_by(|a, b| a.critical_dose.mj_per_cm2().total_cmp(&b.critical_dose.mj_per_cm2()));
+        let grows = line.and_then(|line| {
+            let growth =
+                cured.iter().filter_map(|(um, _)| Some(line.width(curing.white(*um).ok()?)));
+            let most = growth.map(Length::um).fold(0.0, f64::max);
+            let depth = broadening_depth(&*curing.model, line.critical_dose);
+            (most > 0.0).then(|| {
+                format!(
+                    "edges grow by up to {most:.1} um at these doses, which cure deeper than the \
+                     broadening depth of {:.1} um: lamp compensate moves them back",
+                    depth.um()
+                )
+            })
+        });
+        loose.into_iter().chain(grows).collect()
     }
 
     /// Returns what cures gray levels.
@@ -243,6 +309,12 @@ impl Curing {
     }
 }
 
+/// Writes a number of layers.
+fn layers(number: f64) -> String {
+    let number = round_significant(number, 3);
+    if number == 1.0 { "1 layer".to_owned() } else { format!("{number} layers") }
+}
+
 /// Rounds as stacks record times: gray levels are for the time that the printer reads.
 fn to_whole_us(time: ExposureTime) -> ExposureTime {
     ExposureTime::from_ms((time.ms() * 1000.0).round() / 1000.0)
@@ -254,6 +326,8 @@ mod tests {
 
     use super::*;
     use crate::calibrate::CsvTable;
+    use crate::material::{Given, GivenNumber, WidthNumbers};
+    use crate::resin::WidthSensitivity;
 
     fn times() -> Exposure {
         let table = CsvTable::parse("thickness_um,exposure_ms\n25,120\n100,300\n").unwrap();
@@ -279,6 +353,71 @@ mod tests {
         assert_eq!(exposure.time(layer), Err(no_light.clone()));
         assert_eq!(exposure.check_light(), Err(no_light));
         assert!(exposure.check(layer).is_ok() && exposure.levels(layer).is_ok());
+    }
+
+    #[test]
+    fn layers_bond_by_the_cure_depth_of_white() {
+        let by = |overcure: Option<f64>, stated: Option<f64>| {
+            let mut material = Material::builtin("lamp-suspension").unwrap();
+            let given = |value| GivenNumber { value, plus_minus: None, source: "a".to_owned() };
+            material.overcure = stated.map(given);
+            Exposure::by_material(material, None, overcure).unwrap()
+        };
+        for (overcure, stated, wanted) in [
+            (None, None, 1.0),
+            (None, Some(2.5), 2.5),
+            (Some(1.5), Some(2.5), 1.5),
+            (Some(0.8), None, 0.8),
+        ] {
+            let exposure = by(overcure, stated);
+            assert_eq!(exposure.overcure(), Some(wanted));
+            for um in [50.0, 100.0, 200.0].map(Length::from_um) {
+                // The dose of equation 40 for white, by its own numbers: 137.4 exp(d/215.2).
+                let dose = Intensity::from_mw_per_cm2(1600.0) * exposure.time(um).unwrap();
+                let depth = 215.2 * (dose.mj_per_cm2() / 137.4).ln();
+                assert!((depth / um.um() - wanted).abs() < 1e-4, "{depth} for {wanted} of {um}");
+                let layers = exposure.layers_cured(um).unwrap().unwrap();
+                assert!((layers - wanted).abs() < 1e-4, "{layers} for {wanted}");
+            }
+            let said = exposure.doubts([Length::from_um(200.0)].into_iter());
+            let loose = said.iter().any(|line| line.contains("no layer bonds"));
+            assert_eq!(loose, wanted <= 1.0, "{said:?}");
+        }
+        assert_eq!(times().layers_cured(Length::from_um(50.0)), Ok(None));
+    }
+
+    #[test]
+    fn a_bond_deeper_than_the_broadening_depth_moves_edges() {
+        let mut material = Material::builtin("lamp-no-absorber").unwrap();
+        let number = |mj| Given {
+            value: Dose::from_mj_per_cm2(mj),
+            plus_minus: None,
+            source: "a".to_owned(),
+        };
+        let sensitivity = Given {
+            value: WidthSensitivity::from_um_per_mj_per_cm2(0.2),
+            plus_minus: None,
+            source: "a".to_owned(),
+        };
+        material.cure_width = vec![WidthNumbers {
+            feature_size: Length::from_um(8000.0),
+            direction: None,
+            critical_dose: number(60.0),
+            sensitivity,
+            measured: None,
+        }];
+        let said = |overcure| {
+            let exposure = Exposure::by_material(material.clone(), None, Some(overcure)).unwrap();
+            exposure.doubts([Length::from_um(100.0)].into_iter())
+        };
+        // 002 figure 78: B_d is 638.51 ln(60/39.4), 268.5 um. 300 um take 39.4 exp(300/638.51), 63.03
+        // mJ/cm2, which move edges by 0.2 (63.03 - 60) um.
+        let two = said(2.0);
+        assert!(!two.iter().any(|line| line.contains("edges grow")), "{two:?}");
+        let three = said(3.0);
+        let words = "edges grow by up to 0.6 um at these doses, which cure deeper than the broadening \
+                     depth of 268.5 um";
+        assert!(three.iter().any(|line| line.starts_with(words)), "{three:?}");
     }
 
     #[test]

@@ -34,6 +34,9 @@ pub enum MaterialError {
     /// Nothing says how doses of the layers above fade.
     #[error("many-layers needs to know how light fades: add [working-curve]")]
     NoFadingOfLayers,
+    /// The depth that white cures is no plausible number of layers.
+    #[error("overcure.value must be a number of layers from 0.1 to 100")]
+    Overcure,
     /// A constant is infinite or not a number.
     #[error("constants.{0}.value must be a finite number")]
     NoNumber(String),
@@ -113,6 +116,7 @@ impl Catalogued for Material {
         self.spread()?;
         self.edge_light()?;
         self.gamma()?;
+        self.overcure()?;
         self.working_curve()?;
         self.dimmed_lamp()?;
         self.gray_curve()?;
@@ -359,6 +363,21 @@ source = "notebook, page 3"
         for gamma in ["0", "-1", "nan", "inf"] {
             let said = refused(&format!("[gamma]\nvalue = {gamma}\nsource = \"a\"\n"));
             assert_eq!(said, "gamma.value must be above zero");
+        }
+    }
+
+    #[test]
+    fn a_material_may_state_its_overcure() {
+        let with = |value: &str| {
+            Material::from_toml(&format!("{WHOLE}[overcure]\nvalue = {value}\nsource = \"a\"\n"))
+        };
+        let material = with("2.5").unwrap();
+        assert_eq!(material.overcure(), Ok(2.5));
+        assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material));
+        assert_eq!(Material::from_toml(WHOLE).unwrap().overcure(), Ok(1.0));
+        for value in ["0", "-1", "nan", "101"] {
+            let said = with(value).unwrap_err().to_string();
+            assert_eq!(said, "overcure.value must be a number of layers from 0.1 to 100");
         }
     }
 

@@ -69,6 +69,9 @@ pub struct Material {
     pub dimmed_lamp: Option<DimmedLines>,
     /// The model of two penetration depths (000 eq. 3.8).
     pub two_depth: Option<TwoDepthNumbers>,
+    /// How deep full white cures, in layers: 1 cures just the layer, more bonds it to the one below (002
+    /// section 3.4.1). Commands take it where they are not given another.
+    pub overcure: Option<GivenNumber>,
     /// The cure width of features of several sizes (002 section 3.4.4).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cure_width: Vec<WidthNumbers>,
@@ -85,6 +88,9 @@ pub struct Material {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, Constant>,
 }
+
+/// The depths that full white may cure, in layers. Others are slips.
+pub const OVERCURES: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 /// The numbers of how far light spreads sideways: one standard deviation, or two.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -240,6 +246,15 @@ impl Material {
         let gamma = self.gamma.as_ref().map_or(1.0, |gamma| gamma.value);
         // With an exponent of zero or less, black would be as bright as white, or brighter.
         if gamma > 0.0 && gamma.is_finite() { Ok(gamma) } else { Err(MaterialError::Gamma) }
+    }
+
+    /// Returns how deep full white cures, in layers; 1 if the material does not say it.
+    ///
+    /// # Errors
+    /// Returns an error if it is not from 0.1 to 100.
+    pub fn overcure(&self) -> Result<f64, MaterialError> {
+        let overcure = self.overcure.as_ref().map_or(1.0, |overcure| overcure.value);
+        if OVERCURES.contains(&overcure) { Ok(overcure) } else { Err(MaterialError::Overcure) }
     }
 
     /// Returns the working curve, if there is one.

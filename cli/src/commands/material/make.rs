@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use lamp_grayscale::exposure::MeasuredDoses;
-use lamp_grayscale::material::{BestBond, Composition, LawVariable, Material};
+use lamp_grayscale::material::{BestBond, Composition, GivenNumber, LawVariable, Material};
 use lamp_pipeline::documents::{document, read_file};
 use lamp_stack::{Length, format_significant};
 
@@ -90,7 +90,12 @@ pub(super) fn run(args: &MakeArgs, common: &Common) -> Result<(), Exit> {
             let depth = Length::from_um(thickness.um() * overcure);
             let best = measured.best_bond(depth).map_err(|error| failed(error.into()))?;
             let made = measured.of_composition(best.over, best.at);
-            let made = made.map_err(|error| failed(error.into()))?;
+            let mut made = made.map_err(|error| failed(error.into()))?;
+            made.overcure = Some(GivenNumber {
+                value: overcure,
+                plus_minus: None,
+                source: format!("lamp material make --best bd, for layers of {thickness}"),
+            });
             let mut says = left_out(&measured, best.over);
             says.push(bonds(&best, depth));
             let doses = MeasuredDoses::of_working_curve(&made);
@@ -156,6 +161,7 @@ fn left_out(measured: &Material, over: LawVariable) -> Vec<String> {
         ("two-depth", measured.two_depth.is_some()),
         ("kinetics", measured.kinetics.is_some()),
         ("many-layers", measured.many_layers.is_some()),
+        ("overcure", measured.overcure.is_some()),
         ("the other law", measured.laws.len() > 1),
         (
             "critical-dose of spread",

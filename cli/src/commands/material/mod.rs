@@ -218,7 +218,8 @@ fn light_laws(material: &Material) -> impl Iterator<Item = String> + '_ {
     let laws = material.laws.iter().map(|law| {
         format!("law over {} ({} to {} {})", law.over, law.least.at, law.most.at, law.over.unit())
     });
-    spread.into_iter().chain(gamma).chain(laws)
+    let overcure = material.overcure.as_ref().map(|it| format!("overcure {}", it.value));
+    spread.into_iter().chain(gamma).chain(overcure).chain(laws)
 }
 
 /// How light spreads. Built-in and checked materials have no faults.
