@@ -179,7 +179,7 @@ fn materials() -> impl Strategy<Value = Material> {
             ((curve, gray, gray_light, two_depth, cure_width), kinetics),
             constants,
         )| {
-            let dimmed = gray.clone();
+            let (dimmed, many_layers) = (gray.clone(), gamma.clone());
             let end =
                 |at| LawEnd { at, depth: Some(curve.clone()), width: cure_width.first().cloned() };
             let law = LawNumbers {
@@ -196,7 +196,7 @@ fn materials() -> impl Strategy<Value = Material> {
                 gamma,
                 laws: vec![law],
                 overcure: None,
-                many_layers: gamma.clone(),
+                many_layers,
                 working_curve: Some(curve),
                 gray,
                 gray_light,

@@ -94,9 +94,8 @@ impl Material {
 }
 
 fn scale<T: Quantity>(given: &mut Given<T>, by: f64) {
-    let scaled = |number: T| T::of(number.number() * by);
-    given.value = scaled(given.value);
-    given.plus_minus = given.plus_minus.map(scaled);
+    given.value = T::of(given.value.number() * by);
+    given.plus_minus = given.plus_minus.map(|half| T::of(half.number() * by));
 }
 
 #[cfg(test)]

@@ -72,7 +72,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let fits = fit_widths(&measured.points).map_err(|error| at_place(error.into()))?;
     let many = many_layers(args.thickness, of_depths, &measured.points);
-    let many = many.map_err(|error| at_place(error))?;
+    let many = many.map_err(at_place)?;
     let progress = Progress::new("calibrate", common, true);
     if depths.is_none() {
         progress.say(
