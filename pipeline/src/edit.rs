@@ -138,12 +138,6 @@ pub struct EditCount {
 }
 
 impl EditCount {
-    /// Returns the sentence on what it changed.
-    pub fn text(&self) -> String {
-        let Self { edit, layers, pixels } = self;
-        format!("edit {edit}: {pixels} pixels changed in {layers} layers")
-    }
-
     /// Returns the warning of an edit that changed nothing.
     pub fn warning(&self) -> Option<String> {
         (self.pixels == 0).then(|| unchanged_text(self.edit, self.layers == 0))
@@ -176,7 +170,7 @@ impl Editing {
         Ok(Self::with(list, settings.files()?))
     }
 
-    /// Reads the files that a variant of a list, as text, names beside that list.
+    /// Reads the files that a variant of a list, as text, names. They stand next to the list.
     ///
     /// # Errors
     /// Returns an error if the variant, or a list of labels that it names, is wrong.

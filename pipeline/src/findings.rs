@@ -31,7 +31,7 @@ pub struct RangeFindings {
     pub is_blank: bool,
     /// Edits that were made in no layer: the stage's place and the edit's number.
     pub(crate) unused_edits: BTreeSet<(usize, usize)>,
-    /// Edits that changed no pixel, those of no layer included.
+    /// Edits that changed no pixel, also because they were made in no layer.
     pub(crate) unchanged_edits: BTreeSet<(usize, usize)>,
     /// Lines about the part.
     pub of_part: Vec<String>,

@@ -10,6 +10,7 @@ use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::EditStageArgs;
 use crate::exit::Exit;
 use crate::output::json_report::{JsonReport, ReportTo, schemas};
+use crate::output::numbers::number_of;
 use crate::streams::{
     check_beside, check_not_input, extension, input_name, is_stream, progress, read_passing,
     write_file, write_layers,
@@ -153,7 +154,9 @@ fn make(
     })?;
     let counts = editing.counts();
     for count in &counts {
-        progress.detail(&count.text());
+        let pixels = number_of(count.pixels, "pixel");
+        let layers = number_of(count.layers as u64, "layer");
+        progress.detail(&format!("edit {}: {pixels} changed in {layers}", count.edit));
         count.warning().iter().for_each(|warning| progress.warn(warning));
     }
     match report {

@@ -188,7 +188,7 @@ impl FilmHole {
     }
 }
 
-/// Returns a direction of length 1, or `None` if there is none.
+/// Returns a direction of length 1, or `None` of a vector without a direction.
 fn unit(direction: [f64; 3]) -> Option<[f64; 3]> {
     let length = direction.iter().map(|part| part * part).sum::<f64>().sqrt();
     (length > 1e-9 && length.is_finite()).then(|| direction.map(|part| part / length))

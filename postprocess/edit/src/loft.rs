@@ -87,7 +87,7 @@ pub enum LoftProblem {
     #[error("its path has corners: write bend = \"...\", the radius of its axis there")]
     NoBend,
     /// A bend takes more of the path than there is between its points.
-    #[error("the bend at point {0} of its path has no room between the points beside it")]
+    #[error("the bend at point {0} of its path needs more room between its points")]
     WideBend(usize),
     /// The radius of bends is less than the section reaches to the inside.
     #[error("bend must be more than {0}: sections reach as far inwards from the axis")]
@@ -101,7 +101,7 @@ pub enum LoftProblem {
     /// The sections are not in order.
     #[error("section {0} is not beyond the one before: `at` is the distance along the path")]
     SectionOrder(usize),
-    /// A section lies beyond the path.
+    /// The path ends before a section.
     #[error("section {section} is beyond the path, which is {length} long")]
     BeyondPath {
         /// The section's number, from 1.

@@ -204,7 +204,7 @@ impl Axis {
     }
 
     /// Returns the least distance of a point from the edges of sections whose planes it is in,
-    /// below zero if it is inside of one, and infinite if there is none.
+    /// below zero if it is inside of one, and infinite without such a section.
     fn distance(&self, cuts: &[Cut], point: Vec3) -> f64 {
         const STEPS: u32 = 60;
         let ahead = |place: f64| {

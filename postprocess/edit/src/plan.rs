@@ -313,8 +313,8 @@ impl Edit {
     }
 }
 
-/// Returns the number of pixels that an edit changed; of images that changed their size, those that
-/// they gained or lost, or, if they were turned, all.
+/// Returns the number of pixels that an edit changed. Images that changed their size count the pixels
+/// that they gained or lost, and turned images all.
 fn changed_pixels(before: &Image, after: &Image) -> u64 {
     let [was, is] = [before, after].map(|image| [image.width(), image.height()]);
     let [pixels, left] = [was, is].map(|[width, height]| u64::from(width) * u64::from(height));
