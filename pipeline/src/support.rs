@@ -5,7 +5,7 @@ use std::num::{NonZeroU8, NonZeroU32};
 use std::str::FromStr;
 
 use lamp_slicing::SurfaceName;
-use lamp_stack::Length;
+use lamp_stack::{FlowSection, Length, StrutSection};
 use lamp_supports::{AvoidedSurface, CheckOptions, PillarSizes, SupportFoot, SupportOptions};
 use serde::{Deserialize, Serialize};
 
@@ -42,9 +42,18 @@ pub struct SupportSettings {
     /// Least distance between pillars and the part.
     #[serde(with = "text")]
     pub clearance: Length,
-    /// Radius of supports.
+    /// Radius of supports, or half the chord of streamlined ones.
     #[serde(with = "text")]
     pub radius: Length,
+    /// Section of supports to the part.
+    #[serde(with = "text", skip_serializing_if = "is_round")]
+    pub section: StrutSection,
+    /// Thickness of a streamlined section, as a share of its chord.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub thickness_ratio: Option<f64>,
+    /// Direction of the flow along which the section lies, from x counterclockwise.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub flow: Option<FlowAngle>,
     /// Largest angle of a support to the vertical.
     #[serde(with = "text")]
     pub max_tilt: Degrees,
@@ -91,6 +100,9 @@ impl Default for SupportSettings {
             base: options.pillar.base,
             clearance: options.pillar.clearance,
             radius: options.radius,
+            section: StrutSection::Round,
+            thickness_ratio: None,
+            flow: None,
             max_tilt: Degrees(options.max_tilt),
             max_length: options.max_length,
             edge_clearance: options.edge_clearance,
@@ -137,10 +149,23 @@ impl SupportSettings {
             max_length: self.max_length,
             keep: self.keep.into(),
             radius: self.radius,
+            section: self.flow_section(),
             hold: self.hold,
             least_support: self.least_support,
             threshold: self.threshold,
         }
+    }
+
+    /// Returns the section of streamlined supports.
+    fn flow_section(&self) -> Option<FlowSection> {
+        if self.section == StrutSection::Round {
+            return None;
+        }
+        let (sin, cos) = self.flow.map_or(0.0, |flow| flow.0).to_radians().sin_cos();
+        // Nine digits are short in plans, and make quarter turns exact; zero has no sign.
+        let [cos, sin] = [cos, sin].map(|part| (part * 1e9).round() / 1e9 + 0.0);
+        let thickness_ratio = self.thickness_ratio.unwrap_or(THICKNESS_RATIO);
+        Some(FlowSection { section: self.section, thickness_ratio, flow: [cos, sin, 0.0] })
     }
 
     /// Returns the names of surfaces to avoid.
@@ -159,6 +184,35 @@ impl SupportSettings {
             speck_layers: self.speck_layers,
             least_support: self.least_support,
             ..CheckOptions::default()
+        }
+    }
+}
+
+/// The thickness of streamlined supports, as a share of their chord.
+const THICKNESS_RATIO: f64 = 0.4;
+
+fn is_round(section: &StrutSection) -> bool {
+    *section == StrutSection::Round
+}
+
+/// A level direction, by its angle to x in degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlowAngle(pub f64);
+
+impl fmt::Display for FlowAngle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}deg", self.0)
+    }
+}
+
+impl FromStr for FlowAngle {
+    type Err = String;
+
+    /// Parses `90deg` or `90`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim_end_matches("deg").trim_end().parse() {
+            Ok(degrees) if (-360.0..=360.0).contains(&degrees) => Ok(Self(degrees)),
+            _ => Err(format!("`{text}` is not a direction: write an angle to x, such as 90deg")),
         }
     }
 }
@@ -210,6 +264,21 @@ impl FromStr for Curvature {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn flows_have_directions() {
+        let flow = |angle: &str| {
+            let flow = Some(angle.parse().unwrap());
+            let section = StrutSection::Ellipse;
+            let settings = SupportSettings { section, flow, ..SupportSettings::default() };
+            settings.options().section.unwrap().flow
+        };
+        assert_eq!(flow("90deg"), [0.0, 1.0, 0.0]);
+        assert_eq!(flow("-180"), [-1.0, 0.0, 0.0]);
+        assert_eq!(flow("30deg"), [0.866_025_404, 0.5, 0.0]);
+        assert_eq!(SupportSettings::default().options().section, None);
+        assert!(["361deg", "nan", "x"].iter().all(|text| text.parse::<FlowAngle>().is_err()));
+    }
 
     #[test]
     fn angles_and_curvatures_have_units() {

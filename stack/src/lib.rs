@@ -113,7 +113,7 @@ pub use record::{
 };
 pub use shell::{file_word, quoted, words};
 pub use significant::{format_significant, round_significant, to_nm};
-pub use strut::Strut;
+pub use strut::{FlowSection, Strut, StrutSection};
 pub use text::{line_of, one_line};
 pub use toml_document::{TomlError, TomlStep, read_toml};
 

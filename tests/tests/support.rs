@@ -238,6 +238,71 @@ fn images_get_room_for_bases_beside_the_part() {
 }
 
 #[test]
+fn streamlined_supports_lie_along_the_flow_and_join_the_part() {
+    let scratch = with_cores();
+    let line = "lamp support core.tif --part core.stl --hold 20mm --least-support 0 --radius 0.6mm \
+                --plan plan.toml --stl struts.stl --report report.json -o held.tif";
+    let before = scratch.layers("core.tif");
+    // The areas of the sections as shares of the square of the chord, 40% thick.
+    let aerofoil = 10.0
+        * 0.4
+        * (0.2969 * 2.0 / 3.0 - 0.1260 / 2.0 - 0.3516 / 3.0 + 0.2843 / 4.0 - 0.1036 / 5.0);
+    for (section, share) in [("ellipse", 0.1 * std::f64::consts::PI), ("aerofoil", aerofoil)] {
+        scratch.run(&format!("{line} --section {section} --flow 90deg")).succeeds();
+        assert!(islands(&scratch, "held.tif").is_empty());
+        let plan = String::from_utf8(scratch.bytes("plan.toml")).unwrap();
+        assert!(
+            plan.contains(&format!("section = \"{section}\", thickness_ratio = 0.4")),
+            "{plan}"
+        );
+        scratch.run("lamp edit core.tif plan.toml -q -o edited.tif").succeeds_quietly();
+        assert!(scratch.bytes("edited.tif") == scratch.bytes("held.tif"));
+        let report = report(&scratch, "report.json");
+        let support = &report["plans"][0]["places"][0]["supports"][0];
+        let number = |key: &str| support[key].as_f64().unwrap();
+        let area = number("volume_mm3") / number("length_mm");
+        assert!((area / (share * 1.2 * 1.2) - 1.0).abs() < 3e-3, "{area}");
+        assert_eq!(support["rods"][0]["section"], section);
+        assert_eq!(support["rods"][0]["thickness_mm"], 0.48);
+        scratch.run("lamp mesh check struts.stl --strict").succeeds_quietly();
+
+        // Halfway down, the section is a chord long in y, and thin in x even if it leans.
+        let height = number("length_mm") / 2.0 * number("tilt_degrees").to_radians().cos();
+        let z = report["plans"][0]["z_mm"].as_f64().unwrap() - height;
+        let after = scratch.layers("held.tif");
+        let (was, is) = (&before[(z / 0.1) as usize], &after[(z / 0.1) as usize]);
+        let mask = mask(is).combined(lamp_stack::Op::Difference, mask(was)).unwrap();
+        let rows: Vec<_> = mask.rows().filter(|row| !row.is_empty()).collect();
+        assert!((11..=13).contains(&rows.len()), "{}", rows.len());
+        assert!(rows.iter().all(|row| row[1] - row[0] <= 8), "{rows:?}");
+
+        // The surface of the stack is one closed mesh. Each strut between walls makes a handle of
+        // it, which lowers the Euler number by 2.
+        scratch.run("lamp mesh-out held.tif -o joined.stl").succeeds_quietly();
+        scratch.run("lamp mesh-out core.tif -o apart.stl").succeeds_quietly();
+        let check = |name: &str| {
+            let ran = scratch.run(&format!("lamp mesh check {name} --strict --json")).succeeds();
+            serde_json::from_slice::<Value>(&ran.stdout).unwrap()
+        };
+        let [joined, apart] = ["joined.stl", "apart.stl"].map(check);
+        for (mesh, euler) in [(&joined, -2), (&apart, 2)] {
+            assert_eq!((&mesh["clean"], &mesh["counts"]["shells"]), (&true.into(), &1.into()));
+            assert_eq!(mesh["shells"][0]["euler"], euler);
+        }
+    }
+    for (words, said) in [
+        ("--flow 90deg", "--section"),
+        ("--thickness-ratio 30%", "--section"),
+        ("--section ellipse --to platform", "round"),
+        ("--section ellipse --thickness-ratio 2%", "too thin"),
+        ("--section oval", "aerofoil"),
+        ("--section ellipse --flow north", "90deg"),
+    ] {
+        scratch.run(&format!("{line} {words}")).is_wrong_usage(&[said]);
+    }
+}
+
+#[test]
 fn undersides_are_held_and_surfaces_avoided() {
     let scratch = with_cores();
     let line = "lamp support core.tif --part core.stl --report report.json --plan plan.toml";

@@ -12,8 +12,8 @@ use lamp_pipeline::compensate::{CompensateSettings, EdgeDistance, FiringShrinkag
 use lamp_pipeline::dither::DitherSettings;
 use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
-use lamp_pipeline::support::{Curvature, Degrees, SupportSettings};
-use lamp_stack::{Length, Op};
+use lamp_pipeline::support::{Curvature, Degrees, FlowAngle, SupportSettings};
+use lamp_stack::{Length, Op, StrutSection};
 use lamp_supports::{
     AvoidedSurface, CheckOptions, FindingGroup, PillarSizes, SupportFoot, SupportOptions,
     avoided_surfaces,
@@ -233,10 +233,29 @@ pub(crate) struct SupportStageArgs {
     #[arg(value_parser = parse_distance, help_heading = PILLARS)]
     clearance: Length,
 
-    /// Radius of supports
+    /// Radius of supports; half the chord of streamlined ones
     #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().radius)]
     #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
     radius: Length,
+
+    /// Section of supports to the part
+    #[arg(long, value_name = "SECTION", default_value_t = StrutSection::Round, help_heading = CHOICE)]
+    #[arg(value_parser = one_of_described::<StrutSection>(&[
+        "A circle",
+        "An ellipse, its long axis along --flow",
+        "A symmetric aerofoil, its leading edge upstream",
+    ]))]
+    section: StrutSection,
+
+    /// Direction of the flow past the supports: its angle from x, counterclockwise from above [default:
+    /// 0deg, along x]
+    #[arg(long, value_name = "ANGLE", help_heading = CHOICE, hide_short_help = true)]
+    flow: Option<FlowAngle>,
+
+    /// Thickness of a streamlined section as a share of its chord [default: 40%]
+    #[arg(long, value_name = "SHARE", help_heading = CHOICE, hide_short_help = true)]
+    #[arg(value_parser = parse_thickness_ratio)]
+    thickness_ratio: Option<f64>,
 
     /// Largest angle between a support and the vertical
     #[arg(long, value_name = "ANGLE", default_value_t = Degrees(SupportOptions::default().max_tilt))]
@@ -371,6 +390,9 @@ impl From<SupportStageArgs> for SupportSettings {
             base: args.base,
             clearance: args.clearance,
             radius: args.radius,
+            section: args.section,
+            thickness_ratio: args.thickness_ratio,
+            flow: args.flow,
             max_tilt: args.max_tilt,
             max_length: args.max_length,
             edge_clearance: args.edge_clearance,
@@ -413,6 +435,11 @@ fn parse_share(text: &str) -> Result<f64, String> {
 
 fn parse_dose(text: &str) -> Result<Dose, String> {
     text.parse().map_err(|error: QuantityError| error.to_string())
+}
+
+fn parse_thickness_ratio(text: &str) -> Result<f64, String> {
+    let share = parse_percent(text)?;
+    if share < 0.05 { Err(format!("`{text}` is too thin: write at least 5%")) } else { Ok(share) }
 }
 
 /// Parses a share: `25%` or `0.25`.

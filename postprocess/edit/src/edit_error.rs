@@ -114,6 +114,14 @@ pub enum EditProblem {
     /// The line, strut or cone has no length.
     #[error("it ends where it begins")]
     NoLength,
+    /// A round strut has keys of a streamlined one, or that lacks one of them.
+    #[error(
+        "thickness_ratio and flow belong to section = \"ellipse\" or \"aerofoil\", which need both"
+    )]
+    StrutSection,
+    /// A streamlined strut points along its flow, or the flow has no direction.
+    #[error("flow needs a direction across the strut")]
+    StrutFlow,
     /// A loft is no solid.
     #[error(transparent)]
     Loft(#[from] LoftProblem),

@@ -73,6 +73,38 @@ fn stamped(layers: Vec<Layer>, list: &str, pages: Vec<Layer>) -> Result<Vec<Laye
 }
 
 #[test]
+fn a_streamlined_strut_is_round_if_it_is_as_thick_as_long_and_needs_all_its_keys() {
+    let drawn = |keys: &str| {
+        let ends = r#"from = ["4.1mm", "1.3mm", "0mm"], to = ["11.2mm", "3.9mm", "5.3mm"]"#;
+        let list = format!("[[edit]]\nstrut = {{ {ends}, diameter = \"3.7mm\"{keys} }}\n");
+        let layers = (0..6).map(|k| layer(k, Image::Mask(Mask::black(WIDTH, HEIGHT)))).collect();
+        edited(layers, &list, vec![])
+    };
+    let masks = |keys: &str| -> Vec<Mask> {
+        drawn(keys).unwrap().iter().map(|layer| mask(layer).clone()).collect()
+    };
+    let ellipse = |ratio: f64| {
+        format!(", section = \"ellipse\", thickness_ratio = {ratio:?}, flow = [0.3, 1, 0]")
+    };
+    let round = masks("");
+    assert_eq!(masks(&ellipse(1.0)), round);
+    let [thin, round]: [u64; 2] =
+        [masks(&ellipse(0.5)), round].map(|masks| masks.iter().map(Mask::white_pixels).sum());
+    assert!(thin > 0 && thin < round * 3 / 4, "{thin} {round}");
+    for (keys, words) in [
+        (", flow = [1, 0, 0]", "belong to section"),
+        (", section = \"ellipse\", flow = [1, 0, 0]", "need both"),
+        (", section = \"aerofoil\", thickness_ratio = 0.3", "need both"),
+        (", section = \"aerofoil\", thickness_ratio = 0.0, flow = [1, 0, 0]", "no share"),
+        (", section = \"aerofoil\", thickness_ratio = 0.3, flow = [0, 0, 0]", "flow needs"),
+        (", section = \"oval\"", "oval"),
+    ] {
+        let error = drawn(keys).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
 fn each_edit_counts_its_pixels() {
     let list = r#"
         [[edit]]

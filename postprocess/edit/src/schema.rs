@@ -2,9 +2,11 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::path::PathBuf;
+use std::str::FromStr;
 
-use lamp_stack::{Length, LengthError, Op, Orientation};
+use lamp_stack::{Length, LengthError, Op, Orientation, StrutSection};
 use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::film_hole::FilmHole;
@@ -140,7 +142,7 @@ pub(super) enum CylinderAxis {
     Z,
 }
 
-/// A straight round rod between two points.
+/// A straight rod between two points.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StrutEnds {
@@ -148,8 +150,16 @@ pub(super) struct StrutEnds {
     pub(super) from: [Length; 3],
     #[serde(deserialize_with = "lengths")]
     pub(super) to: [Length; 3],
+    /// Of a streamlined section, the chord.
     #[serde(deserialize_with = "size")]
     pub(super) diameter: Length,
+    #[serde(default, deserialize_with = "named")]
+    pub(super) section: StrutSection,
+    /// The thickness of a streamlined section as a share of its chord.
+    #[serde(default, deserialize_with = "some_ratio")]
+    pub(super) thickness_ratio: Option<f64>,
+    /// The direction from the leading to the trailing edge.
+    pub(super) flow: Option<[f64; 3]>,
 }
 
 /// A straight round cone or frustum between two points.
@@ -418,6 +428,17 @@ pub(super) fn size<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Erro
 
 fn some_size<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Length>, D::Error> {
     size(from).map(Some)
+}
+
+fn named<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
+    String::deserialize(from)?.parse().map_err(D::Error::custom)
+}
+
+fn some_ratio<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    match f64::deserialize(from)? {
+        ratio if ratio > 0.0 && ratio <= 1.0 => Ok(Some(ratio)),
+        ratio => Err(D::Error::custom(format!("{ratio} is no share: write one above 0, up to 1"))),
+    }
 }
 
 fn turn<'de, D: Deserializer<'de>>(from: D) -> Result<Orientation, D::Error> {

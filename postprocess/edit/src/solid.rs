@@ -1,7 +1,7 @@
 //! Solids of edits: shapes with another section at each height.
 
 use lamp_build::ImageBounds;
-use lamp_stack::{Cone, Length, Strut};
+use lamp_stack::{Cone, FlowSection, Length, Strut, StrutSection};
 
 use super::edit_error::EditProblem;
 use super::fill::{PixelPoint, RunSet};
@@ -26,9 +26,8 @@ impl Solid {
     /// # Errors
     /// Returns an error if a strut or cone has no length, or a loft's keys contradict each other.
     pub(super) fn of(edit: &Edit, motion: &Motion) -> Result<Option<Self>, EditProblem> {
-        if let Some(StrutEnds { from, to, diameter }) = edit.strut {
-            let strut = Strut::new(motion.of(from), motion.of(to), diameter);
-            return strut.map(|strut| Some(Self::Strut(strut))).ok_or(EditProblem::NoLength);
+        if let Some(ends) = edit.strut {
+            return Ok(Some(Self::Strut(strut(ends, motion)?)));
         }
         if let Some(ConeEnds { from, to, diameters }) = edit.cone {
             let cone = Cone::new([motion.of(from), motion.of(to)], diameters);
@@ -110,6 +109,22 @@ impl Solid {
                 let centre = grid.to_pixels([x, y].map(|at| at.mm()));
                 runs.add_disc(centre, grid.length(Length::from_um(half)));
             }
+        }
+    }
+}
+
+/// Returns a strut after a motion.
+fn strut(ends: StrutEnds, motion: &Motion) -> Result<Strut, EditProblem> {
+    let StrutEnds { from, to, diameter, section, thickness_ratio, flow } = ends;
+    let round =
+        Strut::new(motion.of(from), motion.of(to), diameter).ok_or(EditProblem::NoLength)?;
+    match (section, thickness_ratio, flow) {
+        (StrutSection::Round, None, None) => Ok(round),
+        (StrutSection::Round, ..) | (_, None, _) | (_, _, None) => Err(EditProblem::StrutSection),
+        (section, Some(thickness_ratio), Some(flow)) => {
+            let section = FlowSection { section, thickness_ratio, flow: motion.rotated(flow) };
+            Strut::streamlined(motion.of(from), motion.of(to), diameter, &section)
+                .ok_or(EditProblem::StrutFlow)
         }
     }
 }

@@ -36,7 +36,7 @@ mod vent_tests;
 mod window;
 
 use lamp_slicing::brep::vector::{Vec3, length, sub};
-use lamp_stack::Length;
+use lamp_stack::{FlowSection, Length};
 use std::num::{NonZeroU8, NonZeroU32};
 
 use crate::check::Island;
@@ -122,8 +122,12 @@ pub struct SupportOptions {
     pub max_length: Length,
     /// The most supports that are returned for each place: the one to build, and alternatives.
     pub keep: usize,
-    /// Half the diameter of supports (002 section 2.4.1: half the smallest feature).
+    /// Half the diameter of supports (002 section 2.4.1: half the smallest feature), or of their
+    /// chord.
     pub radius: Length,
+    /// The section of supports to the part, if it is streamlined (002 section 4.5). It lies in the
+    /// circle of the radius, so that all limits hold for it, too.
+    pub section: Option<FlowSection>,
     /// The widest piece of an island that one support holds.
     pub hold: Length,
     /// The share of an island's first layer that its supports must hold. More than one support in
@@ -148,6 +152,7 @@ impl Default for SupportOptions {
             max_length: Length::from_mm(10.0),
             keep: 3,
             radius: Length::from_um(250.0),
+            section: None,
             hold: Length::from_mm(2.0),
             least_support: 0.25,
             threshold: NonZeroU8::MIN,
@@ -214,7 +219,12 @@ impl Support {
         if self.is_pillar() {
             return self.rods.iter().map(Rod::volume_mm3).sum();
         }
-        std::f64::consts::PI * (self.diameter.mm() / 2.0).powi(2) * self.length().mm()
+        let section = self.rods.first().and_then(|rod| rod.section);
+        let area = section.map_or_else(
+            || std::f64::consts::PI * (self.diameter.mm() / 2.0).powi(2),
+            |section| section.area_mm2(self.diameter),
+        );
+        area * self.length().mm()
     }
 }
 

@@ -1,28 +1,29 @@
-//! Straight round rods: the solids that supports are made of.
+//! Straight rods: the solids that supports are made of.
 
 use std::f64::consts::PI;
 use std::ops::Range;
 
 use lamp_slicing::brep::vector::{length, sub};
-use lamp_stack::{Cone, Length, Strut};
+use lamp_stack::{Cone, FlowSection, Length, Strut};
 
 use super::window::Raster;
 
-/// A straight round rod with flat ends, as wide at each as its diameter there: a strut or a cone of
-/// `lamp edit`.
+/// A straight rod with flat ends: a strut or a cone of `lamp edit`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rod {
     /// The middles of its ends, to whole nanometers.
     pub ends: [[Length; 3]; 2],
-    /// The diameters at its ends.
+    /// The diameters at its ends; of a streamlined strut, its chord.
     pub diameters: [Length; 2],
+    /// The section of a streamlined strut; other rods are round.
+    pub section: Option<FlowSection>,
 }
 
 impl Rod {
     /// Creates a rod between points in millimeters, rounded to whole nanometers.
     pub(super) fn new(ends_mm: [[f64; 3]; 2], diameters: [Length; 2]) -> Self {
         let ends = ends_mm.map(|end| end.map(|place| Length::from_mm(place).to_whole_nm()));
-        Self { ends, diameters: diameters.map(Length::to_whole_nm) }
+        Self { ends, diameters: diameters.map(Length::to_whole_nm), section: None }
     }
 
     /// Returns whether it is equally wide everywhere.
@@ -33,6 +34,9 @@ impl Rod {
     /// Returns its volume in mm³.
     pub fn volume_mm3(&self) -> f64 {
         let [from, to] = self.ends.map(|end| end.map(Length::mm));
+        if let Some(section) = &self.section {
+            return length(sub(to, from)) * section.area_mm2(self.diameters[0]);
+        }
         let [a, b] = self.diameters.map(|diameter| diameter.mm() / 2.0);
         PI / 3.0 * length(sub(to, from)) * (a * a + a * b + b * b)
     }
@@ -58,8 +62,12 @@ impl Rod {
     }
 
     fn strut(&self) -> Option<Strut> {
-        let [from, to] = self.ends;
-        if self.is_strut() { Strut::new(from, to, self.diameters[0]) } else { None }
+        let ([from, to], [chord, _]) = (self.ends, self.diameters);
+        match &self.section {
+            Some(section) => Strut::streamlined(from, to, chord, section),
+            None if self.is_strut() => Strut::new(from, to, chord),
+            None => None,
+        }
     }
 
     fn cone(&self) -> Option<Cone> {

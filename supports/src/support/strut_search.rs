@@ -74,7 +74,7 @@ impl SupportPlanner<'_> {
         }
         let diameter = Length::from_um(2.0 * options.radius.um());
         let ends = ends(origin_mm, direction, &contact, options.radius.mm());
-        let rod = Rod { ends, diameters: [diameter; 2] };
+        let rod = Rod { ends, diameters: [diameter; 2], section: options.section };
         around.try_strut(&rod, &contact, options.radius.mm())?;
         Ok(Support {
             path_mm: vec![origin_mm, contact.at_mm],

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lamp_stack::to_nm;
+use lamp_stack::{StrutSection, to_nm};
 use lamp_supports::{HeldPlace, IslandPlan, Rod, Support, SupportFoot};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -120,8 +120,12 @@ struct RodFields {
     from_mm: [f64; 3],
     /// x, y and z of the other end, in millimeters.
     to_mm: [f64; 3],
-    /// Diameters at both ends, in millimeters.
+    /// Diameters at both ends, in millimeters; of a streamlined rod, its chord.
     diameters_mm: [f64; 2],
+    /// Its section: `round`, `ellipse` or `aerofoil`.
+    section: &'static str,
+    /// Its thickness across the flow, in millimeters; null if it is round.
+    thickness_mm: Option<f64>,
 }
 
 schemas! {
@@ -203,5 +207,8 @@ fn support_fields(support: &Support, drag_mn: Option<f64>) -> SupportFields {
 fn rod_fields(rod: &Rod) -> RodFields {
     let [from_mm, to_mm] = rod.ends.map(|end| end.map(|place| to_nm(place.mm())));
     let diameters_mm = rod.diameters.map(|diameter| to_nm(diameter.mm()));
-    RodFields { from_mm, to_mm, diameters_mm }
+    let section = rod.section.map_or(StrutSection::Round, |of_flow| of_flow.section).name();
+    let thickness_mm =
+        rod.section.map(|of_flow| to_nm(of_flow.thickness_ratio * rod.diameters[0].mm()));
+    RodFields { from_mm, to_mm, diameters_mm, section, thickness_mm }
 }

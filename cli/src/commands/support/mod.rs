@@ -18,7 +18,7 @@ use lamp_pipeline::documents::document;
 use lamp_pipeline::part_file::{PartFile, paths};
 use lamp_pipeline::solid::name_of_all;
 use lamp_pipeline::support::SupportSettings;
-use lamp_stack::{CompensateRecord, Length, Page, PageHeader, PageInfo};
+use lamp_stack::{CompensateRecord, Length, Page, PageHeader, PageInfo, StrutSection};
 use lamp_supports::{
     CheckError, Findings, Support, SupportError, SupportFoot, SupportOptions, SupportPlan, Surface,
     flood_supports, padded, plan_braces, plan_supports, room_for,
@@ -230,6 +230,17 @@ impl SupportArgs {
             return Err(Exit::usage(format!(
                 "--spacing {spacing}: supports are {wide} wide, so they would touch: write at least that"
             )));
+        }
+        let SupportSettings { section, thickness_ratio, flow, .. } = &*self.settings;
+        if *section == StrutSection::Round && (thickness_ratio.is_some() || flow.is_some()) {
+            return Err(Exit::usage(
+                "--flow and --thickness-ratio are of --section ellipse or aerofoil: write one of them",
+            ));
+        }
+        if *section != StrutSection::Round && to == SupportFoot::Platform {
+            return Err(Exit::usage(
+                "--section is of supports to the part: pillars are round, as they are cut off",
+            ));
         }
         check_not_input(&self.output.output, paths(&self.part))?;
         if self.vent.is_none() {

@@ -1,6 +1,6 @@
 //! Plans of supports as lists of edits, which people can change.
 
-use lamp_stack::{Length, one_line};
+use lamp_stack::{FlowSection, Length, one_line};
 use lamp_supports::{Findings, HeldPlace, Rod, Scale, Support, SupportPlan};
 
 /// Returns the plan as a list of edits: room around the images, the rods of each support, and
@@ -88,8 +88,13 @@ fn edits(support: &Support, mark: &str) -> String {
 pub(super) fn shape(rod: &Rod) -> String {
     let [from, to] = rod.ends.map(point);
     let [wide, other] = rod.diameters;
+    let section = rod.section.map_or_else(String::new, |of_flow| {
+        let FlowSection { section, thickness_ratio, flow } = of_flow;
+        let section = section.name();
+        format!(", section = \"{section}\", thickness_ratio = {thickness_ratio}, flow = {flow:?}")
+    });
     match rod.is_strut() {
-        true => format!("strut = {{ from = {from}, to = {to}, diameter = \"{wide}\" }}"),
+        true => format!("strut = {{ from = {from}, to = {to}, diameter = \"{wide}\"{section} }}"),
         false => {
             format!("cone = {{ from = {from}, to = {to}, diameters = [\"{wide}\", \"{other}\"] }}")
         }

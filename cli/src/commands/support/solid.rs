@@ -35,6 +35,10 @@ fn prism(rod: &Rod) -> Vec<Facet> {
     // As much outside the cylinder as inside.
     let outside = 0.5 * (1.0 + (TAU / f64::from(2 * SIDES)).cos());
     let [from_radius, to_radius] = rod.diameters.map(|it| it.mm() / 2.0 / outside);
+    if let Some(section) = &rod.section {
+        let corners = section.corners_mm(axis, rod.diameters[0], SIDES);
+        return walls(from, to, &corners.expect("the flow goes across the strut"));
+    }
     let corner = |end: Vec3, radius: f64, k: u32| {
         let (sin, cos) = (TAU * f64::from(k % SIDES) / f64::from(SIDES)).sin_cos();
         along(along(end, scale(x, radius), cos), scale(y, radius), sin)
@@ -48,9 +52,25 @@ fn prism(rod: &Rod) -> Vec<Facet> {
     (0..SIDES).flat_map(side).collect()
 }
 
+/// Returns the facets of a prism of these corners about its axis, counterclockwise as seen from its
+/// tip.
+fn walls(from: Vec3, to: Vec3, corners: &[Vec3]) -> Vec<Facet> {
+    let stored = |point: Vec3| point.map(|place| place as f32 + 0.0);
+    let [middle, tip] = [from, to].map(stored);
+    let next = corners.iter().cycle().skip(1);
+    let side = |(corner, next): (&Vec3, &Vec3)| {
+        let [a, b] = [corner, next].map(|corner| stored(along(from, *corner, 1.0)));
+        let [c, d] = [corner, next].map(|corner| stored(along(to, *corner, 1.0)));
+        [[a, b, d], [a, d, c], [middle, b, a], [tip, c, d]]
+    };
+    corners.iter().zip(next).flat_map(side).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use lamp_fixtures::Mesh;
+
+    use lamp_stack::{FlowSection, StrutSection};
 
     use super::*;
 
@@ -61,10 +81,17 @@ mod tests {
                 let rod = Rod {
                     ends: [[0.0; 3], to].map(|end| end.map(Length::from_mm)),
                     diameters: diameters.map(Length::from_mm),
+                    section: None,
                 };
-                let mesh = Mesh { facets: prism(&rod) };
-                assert_eq!(mesh.open_edges(), 0);
-                assert!((mesh.volume_mm3() / rod.volume_mm3() - 1.0).abs() < 0.003);
+                let streamlined = [StrutSection::Ellipse, StrutSection::Aerofoil].map(|section| {
+                    let flow = FlowSection { section, thickness_ratio: 0.4, flow: [0.8, 0.6, 0.0] };
+                    Rod { section: Some(flow), diameters: [rod.diameters[0]; 2], ..rod }
+                });
+                for rod in [rod].iter().chain(&streamlined) {
+                    let mesh = Mesh { facets: prism(rod) };
+                    assert_eq!(mesh.open_edges(), 0);
+                    assert!((mesh.volume_mm3() / rod.volume_mm3() - 1.0).abs() < 0.003, "{rod:?}");
+                }
             }
         }
     }
