@@ -9,8 +9,8 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use lamp_machine::{Machine, Recoating};
 use lamp_stack::{Layer, Length, Mask, MemorySize};
 use lamp_supports::{
-    AcceptedFindings, CheckError, CheckOptions, CopyRecord, Disagreements, Feature, FindingGroup,
-    FindingRecord, Findings, Listed, Region, Scale, Severity,
+    AcceptedFindings, CheckError, CheckOptions, CopyRecord, DesignRules, Disagreements, Feature,
+    FindingGroup, FindingRecord, Findings, Listed, Region, Scale, Severity,
 };
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ use crate::error::Error;
 use crate::words::{list, optional, path, text, words_of};
 
 /// Changes when other findings come of the same settings and stack.
-pub const CODE: u32 = 2;
+pub const CODE: u32 = 3;
 
 /// The findings to look for, and their limits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,6 +50,9 @@ pub struct CheckSettings {
     /// The machine whose blade drags on what floats: a built-in one or a file.
     #[serde(with = "path")]
     pub machine: PathBuf,
+    /// The design rules: built-in ones or a file.
+    #[serde(with = "path")]
+    pub rules: PathBuf,
 }
 
 impl Default for CheckSettings {
@@ -64,21 +67,24 @@ impl Default for CheckSettings {
             drain: options.drain,
             threshold: options.threshold,
             machine: PathBuf::from("alpha"),
+            rules: PathBuf::from("lamp-mould"),
         }
     }
 }
 
 impl CheckSettings {
-    /// Returns the settings that matter to findings as one text, defaults filled in. A machine's
-    /// file goes without its name.
+    /// Returns the settings that matter to findings as one text, defaults filled in. Files go without
+    /// their names.
     pub fn canonical(&self) -> String {
         let machine = canonical_word::<Machine>(&self.machine).into();
-        format!("check{}", words_of(&Self { machine, ..self.clone() }))
+        let rules = canonical_word::<DesignRules>(&self.rules).into();
+        format!("check{}", words_of(&Self { machine, rules, ..self.clone() }))
     }
 
-    /// Returns the file that the machine is from, unless it is built in.
-    pub fn machine_file(&self) -> Option<&PathBuf> {
-        Some(&self.machine).filter(|path| is_file::<Machine>(path))
+    /// Returns the files that are read: of what is not built in.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        let machine = Some(&self.machine).filter(|path| is_file::<Machine>(path));
+        machine.into_iter().chain(Some(&self.rules).filter(|path| is_file::<DesignRules>(path)))
     }
 
     /// Reads the machine.
@@ -90,8 +96,14 @@ impl CheckSettings {
     }
 
     /// Returns the options of the search for findings.
-    pub fn options(&self) -> CheckOptions {
-        CheckOptions {
+    ///
+    /// # Errors
+    /// Returns an error if the file of the design rules cannot be read, or holds none.
+    pub fn options(&self) -> Result<CheckOptions, Error> {
+        let rules: Option<DesignRules> =
+            self.reports(FindingGroup::Rules).then(|| document(&self.rules)).transpose()?;
+        Ok(CheckOptions {
+            widths: rules.iter().flat_map(DesignRules::widths).collect(),
             threshold: self.threshold,
             speck: self.speck,
             speck_layers: self.speck_layers,
@@ -99,7 +111,7 @@ impl CheckSettings {
             max_overhang: self.max_overhang,
             drain: self.drain,
             ..CheckOptions::default()
-        }
+        })
     }
 
     /// Returns whether findings of a group are reported.
@@ -133,9 +145,10 @@ impl CheckSettings {
         decode: impl Fn(T) -> Result<Layer, E> + Sync,
         machine: Option<&Machine>,
     ) -> Result<Found, E> {
+        let options = self.options()?;
         let (findings, differing) = match &build {
-            Ok(build) => self.find_in_build(build, layers, decode)?,
-            Err(_) => (lamp_supports::check(layers, decode, &self.options())?, Vec::new()),
+            Ok(build) => self.find_in_build(build, layers, decode, &options)?,
+            Err(_) => (lamp_supports::check(layers, decode, &options)?, Vec::new()),
         };
         let of_settings;
         let machine = match machine {
@@ -180,6 +193,7 @@ impl CheckSettings {
         build: &BuildCopies,
         layers: impl Iterator<Item = Result<T, E>>,
         decode: impl Fn(T) -> Result<Layer, E> + Sync,
+        options: &CheckOptions,
     ) -> Result<(Findings, Vec<CopyRecord>), E> {
         let differing: Mutex<DifferingCopies> = Mutex::default();
         // Pages of mesh alone show where it is. They come before all parts.
@@ -205,7 +219,7 @@ impl CheckSettings {
             let parts = found.parts?;
             Some(Layer { info: info.clone(), pitch: *pitch, image: parts.into() })
         };
-        let (whole, parts) = lamp_supports::check_build(layers, decode, parts, &self.options())?;
+        let (whole, parts) = lamp_supports::check_build(layers, decode, parts, options)?;
         let mut findings = whole;
         if let Some(parts) = parts {
             findings = findings.with_parts(parts, |Region { columns, rows }| {

@@ -212,11 +212,12 @@ def check(
     drain: Optional[str] = None,
     threshold: Optional[int] = None,
     machine: Optional[Path] = None,
+    rules: Optional[Path] = None,
 ) -> Findings:
     """Finds features that would be swept away, trap resin or bend as layers are built.
 
     The keywords are the options of `lamp check`, which `lamp check --help` describes. `only` names
-    groups: islands, joints, pockets, overhangs, balance and layers.
+    groups: islands, joints, pockets, overhangs, rules, balance and layers.
     """
     keywords = {
         "only": only,
@@ -227,6 +228,7 @@ def check(
         "drain": drain,
         "threshold": threshold,
         "machine": machine,
+        "rules": rules,
     }
     answer = _native.check(layers, keywords)
     return Findings(answer["found"], answer["reports"])

@@ -77,7 +77,7 @@ const NEAR_PX: u32 = 2;
 /// not, heights to within a layer, areas or volumes to within 5 %, or the pixels of the box's rim if these
 /// are less than a quarter. Overhangs are alike if they are held alike, and reach as far, to within a quarter or 2 pixels, over
 /// as many layers, to within a quarter or 2 layers, and none is 2.5 times as large as the first: rows of pins
-/// and holes. Copies that differ are alike if the first differs at most four times as much. Pixels are widths of
+/// and holes. So are narrow features by their widths and lengths. Copies that differ are alike if the first differs at most four times as much. Pixels are widths of
 /// a pixel of this `pitch`; without one they are square.
 pub fn features<K: Clone + Eq + Hash>(
     records: &[FindingRecord],
@@ -97,7 +97,7 @@ pub fn features<K: Clone + Eq + Hash>(
         }
         let (size, owner) = (Size::of(record, metric), owner(record));
         let near = size.as_ref().into_iter().flat_map(Size::keys).flat_map(|key| {
-            kinds.get(&(record.kind(), owner.clone(), key)).map_or(&[][..], Vec::as_slice)
+            kinds.get(&(record.name(), owner.clone(), key)).map_or(&[][..], Vec::as_slice)
         });
         let like = near.copied().find(|&feature: &usize| {
             let other = Size::of(&records[features[feature].finding], metric);
@@ -109,7 +109,7 @@ pub fn features<K: Clone + Eq + Hash>(
             continue;
         }
         if let Some(size) = size {
-            kinds.entry((record.kind(), owner, size.key())).or_default().push(features.len());
+            kinds.entry((record.name(), owner, size.key())).or_default().push(features.len());
         }
         named.insert(at, features.len());
         let severity = Severity::of(record);
@@ -308,6 +308,8 @@ struct Size {
     joins: bool,
     /// How an overhang is held; none of others.
     held_at: Option<HeldAt>,
+    /// Whether the first side, the layers and the amount decide, and may differ by much.
+    is_loose: bool,
 }
 
 impl Size {
@@ -317,6 +319,7 @@ impl Size {
             FindingRecord::Island(island) => island.floating_px,
             FindingRecord::WeakJoint(joint) => joint.area.area_px,
             FindingRecord::Overhang(overhang) => overhang.area.area_px,
+            FindingRecord::Thin(narrow) | FindingRecord::Slot(narrow) => narrow.length_px as u64,
             FindingRecord::Trap(pocket)
             | FindingRecord::Cup(pocket)
             | FindingRecord::Sealed(pocket)
@@ -330,10 +333,13 @@ impl Size {
         let mut sides = metric.place(sides).map(|side| side.round() as u32);
         // One may be turned.
         sides.sort_unstable();
-        let mut held_at = None;
+        let (mut held_at, mut is_loose) = (None, false);
+        if let FindingRecord::Thin(narrow) | FindingRecord::Slot(narrow) = record {
+            (sides, is_loose) = ([narrow.width_px.round() as u32, 0], true);
+        }
         if let FindingRecord::Overhang(overhang) = record {
             sides = [overhang.reach_px.round() as u32, 0];
-            held_at = Some(overhang.held_at);
+            (held_at, is_loose) = (Some(overhang.held_at), true);
         }
         let [first, mut last] = record.layers();
         let (mut joins, mut share, mut may_differ) = (false, 0.0, 0.05);
@@ -347,13 +353,13 @@ impl Size {
             _ => {}
         }
         let (layers, amount) = (last.saturating_sub(first) + 1, amount as f64);
-        Some(Self { sides, layers, amount, may_differ, share, joins, held_at })
+        Some(Self { sides, layers, amount, may_differ, share, joins, held_at, is_loose })
     }
 
-    /// Returns the square of a grid of sizes in which it is. Overhangs are in one: their leaders are few,
+    /// Returns the square of a grid of sizes in which it is. Overhangs and narrow features are in one: their leaders are few,
     /// as each is a quarter shorter than the one before.
     fn key(&self) -> [u32; 2] {
-        if self.held_at.is_some() { [0; 2] } else { self.sides.map(|side| side / NEAR_PX) }
+        if self.is_loose { [0; 2] } else { self.sides.map(|side| side / NEAR_PX) }
     }
 
     /// Returns the squares in which sizes like it are.
@@ -364,7 +370,7 @@ impl Size {
     }
 
     fn is_like(&self, other: &Self) -> bool {
-        if self.held_at.is_some() {
+        if self.is_loose {
             let near = |a: u32, b: u32| a.abs_diff(b) <= NEAR_PX.max(a.max(b) / 4);
             // The other one came first.
             let is_larger = self.amount > 2.5 * other.amount;

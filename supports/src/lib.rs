@@ -29,17 +29,19 @@ mod record;
 mod support;
 
 pub use check::{
-    CheckError, CheckOptions, Disagreements, Findings, HeldAt, Island, IslandEnd, IslandMinimum,
-    LayerFacts, Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketEffect, PocketKind,
-    Region, WeakJoint, check, check_build, component_at, components_beyond, inner_components,
+    CheckError, CheckOptions, DesignRules, Disagreements, Findings, HeldAt, Island, IslandEnd,
+    IslandMinimum, LayerFacts, LeastWidth, LeastWidthRule, Listed, LoneMinimum, NarrowFeature,
+    OffBalance, Overhang, Pocket, PocketEffect, PocketKind, Region, RuleError, WeakJoint,
+    WidthRule, check, check_build, component_at, components_beyond, inner_components,
 };
 pub use features::{Feature, Severity, features};
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use record::{
     AcceptedFindings, AreaRecord, BorderRecord, BoxRecord, CopyRecord, DoubtfulIslandRecord,
     EmptyPlace, EmptyRecord, FindingGroup, FindingRecord, FoundPixels, IslandRecord, Joined,
-    JointRecord, LayerPlace, LayerSpan, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord,
-    PocketRecord, PointRecord, Scale, Shown, ShownMoment, StrayRowsRecord, records,
+    JointRecord, LayerPlace, LayerSpan, MinimumRecord, NarrowRecord, OffBalanceRecord,
+    OverhangRecord, PartWord, PocketRecord, PointRecord, Scale, Shown, ShownMoment,
+    StrayRowsRecord, records,
 };
 pub use support::{
     AvoidError, AvoidedBox, AvoidedSurface, Braces, HeldPlace, IslandPlan, PillarSizes, Rejection,

@@ -120,6 +120,7 @@ pub(crate) struct CheckStageArgs {
         "White areas that rest on little",
         "Black spaces without a way out",
         "White areas far from the white below",
+        "Walls, pins, slots and holes that break a design rule",
         "Centers of gravity outside the part's base",
         "Stray rows, white at the border, empty layers",
     ]))]
@@ -158,6 +159,10 @@ pub(crate) struct CheckStageArgs {
     /// The machine's defaults apply to resolution, thickness and margin unless you give others
     #[arg(long, value_name = "MACHINE", default_value = "alpha")]
     machine: PathBuf,
+
+    /// Design rules for the widths of walls, pins, slots and holes: lamp-mould, none or a file
+    #[arg(long, value_name = "RULES", default_value = "lamp-mould")]
+    rules: PathBuf,
 }
 
 /// The surfaces of a file.
@@ -374,6 +379,7 @@ impl From<CheckStageArgs> for CheckSettings {
             drain: args.drain,
             threshold: args.threshold,
             machine: args.machine,
+            rules: args.rules,
         }
     }
 }

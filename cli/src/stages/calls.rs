@@ -147,7 +147,7 @@ impl Call for Checking {
     }
 
     fn input_files(&self) -> Result<Vec<PathBuf>, lamp_pipeline::Error> {
-        Ok(self.0.machine_file().into_iter().cloned().collect())
+        Ok(self.0.files().cloned().collect())
     }
 
     fn code(&self) -> (&'static str, u32) {

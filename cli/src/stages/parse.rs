@@ -12,12 +12,13 @@ use lamp_machine::Machine;
 
 use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::compensate::{CompensateSettings, Compensating};
-use lamp_pipeline::documents::{find_own, is_file};
+use lamp_pipeline::documents::{Document, find_own, is_file};
 use lamp_pipeline::edit::{EditSettings, Editing};
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::SliceStage;
 use lamp_pipeline::{Stage, StageChain};
 use lamp_planning::speed::MOST_SPEED_MEMORY;
+use lamp_supports::DesignRules;
 
 use super::after::After;
 use crate::Lamp;
@@ -193,7 +194,7 @@ impl<'a> StageReader<'a> {
         if name == "slice"
             && let Some(machine) = found.get_one::<PathBuf>("machine")
         {
-            let settings = settings_of_machine(&of_machine(machine, folder))
+            let settings = settings_of_machine(&placed::<Machine>(machine, folder))
                 .map_err(|error| error.to_string())?;
             words.extend(words_left_open(&command, &found, &settings));
             // A machine's settings are words like others, so that the same parser checks them.
@@ -248,7 +249,7 @@ impl<'a> StageReader<'a> {
 
     fn support(&self) -> Box<SupportArgs> {
         let mut args: SupportArgs = self.read();
-        args.machine = of_machine(&args.machine, self.folder);
+        args.machine = placed::<Machine>(&args.machine, self.folder);
         Box::new(args)
     }
 
@@ -288,9 +289,11 @@ pub(super) fn parse_tile(options: &[String], folder: &Path) -> Result<TileArgs, 
 pub(crate) fn parse_check(options: &[String], folder: &Path) -> Result<CheckSettings, String> {
     let args: CheckArgs = StageReader::new("check", &with_name("check", options), folder)?.read();
     let mut settings = CheckSettings::clone(&args.settings);
-    settings.machine = of_machine(&settings.machine, folder);
-    // A slip in its file must show before the night.
+    settings.machine = placed::<Machine>(&settings.machine, folder);
+    settings.rules = placed::<DesignRules>(&settings.rules, folder);
+    // A slip in their files must show before the night.
     settings.machine().map_err(|error| Exit::from(error).to_string())?;
+    settings.options().map_err(|error| Exit::from(error).to_string())?;
     Ok(settings)
 }
 
@@ -336,9 +339,9 @@ fn check(matches: &ArgMatches, name: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns where a machine's file stands, or the name of a built-in one.
-fn of_machine(machine: &Path, folder: &Path) -> PathBuf {
-    let mut machine = machine.to_owned();
-    find_own::<Machine>(&mut machine);
-    if is_file::<Machine>(&machine) { folder.join(machine) } else { machine }
+/// Returns where a document's file stands, or the name of a built-in one.
+fn placed<T: Document>(word: &Path, folder: &Path) -> PathBuf {
+    let mut word = word.to_owned();
+    find_own::<T>(&mut word);
+    if is_file::<T>(&word) { folder.join(word) } else { word }
 }

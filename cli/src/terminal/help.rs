@@ -69,6 +69,7 @@ const USUAL: [(&str, &[&str]); 14] = [
             "least_support",
             "max_overhang",
             "drain",
+            "rules",
             "report",
             "evidence",
             "strict",

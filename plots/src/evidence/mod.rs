@@ -99,7 +99,9 @@ impl<'a> EvidencePicture<'a> {
         let Shown { region, pixel, pixels, whole, .. } = self.shown;
         let aspect = self.findings.pitch.map_or(1.0, Pitch::aspect);
         if position == self.shown.layer {
-            let found = pixel.map(|[column, row]| component_at(layer, column, row));
+            let marked = (!self.shown.marked.is_empty()).then(|| self.shown.marked.clone());
+            let component = || pixel.map(|[column, row]| component_at(layer, column, row));
+            let found = marked.or_else(component);
             let found = found.unwrap_or_else(|| unheld_in(region, below, layer));
             let picture = picture(region, layer, PLACE_SIDE, aspect);
             let title = format!("layer {}", index(position));

@@ -6,6 +6,8 @@ use std::ops::Range;
 use lamp_stack::{PageInfo, Pitch};
 use serde::{Deserialize, Serialize};
 
+use super::WidthRule;
+
 /// A rectangle of pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Region {
@@ -223,6 +225,40 @@ pub struct OffBalance {
     pub base: Region,
 }
 
+/// White or black that is narrower than a design rule allows, in layers that follow each other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NarrowFeature {
+    /// Whether it is white: a wall or a pin, and no slot or hole.
+    pub is_white: bool,
+    /// The number of the rule that it breaks where it is narrowest, in the options.
+    pub rule: usize,
+    /// The first and the last layer.
+    pub layers: [u32; 2],
+    /// The least width of a layer in widths of a pixel: of each layer, the width that a tenth of its
+    /// middle line is below or at.
+    pub width: f64,
+    /// The first layer that is so narrow.
+    pub narrowest_layer: u32,
+    /// A pixel of that layer that has the width, as column and row.
+    pub at: [u32; 2],
+    /// The greatest length in a layer, in widths of a pixel: its area over its width.
+    pub length: f64,
+    /// The rectangle around all.
+    pub region: Region,
+    /// Its rows and columns in the narrowest layer, from the top.
+    pub runs: Vec<(u32, Range<u32>)>,
+}
+
+impl NarrowFeature {
+    /// How often a wall or a slot is as long as wide, at least.
+    const ELONGATED: f64 = 3.0;
+
+    /// Returns whether it is a wall or a slot, and no pin or hole.
+    pub fn is_long(&self) -> bool {
+        self.length >= Self::ELONGATED * self.width
+    }
+}
+
 /// Facts from the page of a layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerFacts {
@@ -293,6 +329,8 @@ pub struct Findings {
     pub origin_mm: Option<[f64; 2]>,
     /// The images' width and height in pixels.
     pub size: [u32; 2],
+    /// The rules of widths by which narrow features are found.
+    pub widths: Vec<WidthRule>,
     /// Islands, by what floats.
     pub islands: Listed<Island>,
     /// Islands that never hold a square of the size of a speck nor float for long, as they begin.
@@ -303,6 +341,8 @@ pub struct Findings {
     pub overhangs: Listed<Overhang>,
     /// Pockets by kind and size.
     pub pockets: Listed<Pocket>,
+    /// Features narrower than design rules allow, walls first, the narrowest first.
+    pub narrow: Listed<NarrowFeature>,
     /// Bodies that are off balance, the farthest first.
     pub off_balance: Listed<OffBalance>,
 }
@@ -330,6 +370,7 @@ impl Findings {
             self.weak_joints.left_out,
             self.overhangs.left_out,
             self.pockets.left_out,
+            self.narrow.left_out,
             self.off_balance.left_out,
         ]
         .iter()
@@ -351,6 +392,11 @@ impl Findings {
         self.pockets
             .list
             .sort_by_key(|pocket| (pocket.kind, Reverse(pocket.pixels), pocket.born()));
+        self.narrow.list.sort_by(|a, b| {
+            let kind = |it: &NarrowFeature| (!it.is_white, !it.is_long());
+            let width = a.width.total_cmp(&b.width);
+            kind(a).cmp(&kind(b)).then(width).then(a.layers.cmp(&b.layers))
+        });
         self.off_balance.list.sort_by(|a, b| {
             b.off_pixels.total_cmp(&a.off_pixels).then(a.worst_layer.cmp(&b.worst_layer))
         });
@@ -393,6 +439,11 @@ impl Findings {
             ..overhang
         });
         self.pockets = parts.pockets.map(|pocket| Pocket { layers: span(pocket.layers), ..pocket });
+        self.narrow = parts.narrow.map(|narrow| NarrowFeature {
+            layers: span(narrow.layers),
+            narrowest_layer: narrow.narrowest_layer + base,
+            ..narrow
+        });
         self.off_balance = parts.off_balance.map(|off| OffBalance {
             layer: off.layer + base,
             worst_layer: off.worst_layer + base,

@@ -14,10 +14,13 @@ mod islands;
 mod liquid;
 mod live;
 pub(crate) mod metric;
+mod narrow;
+mod narrows;
 mod overhang;
 mod overhangs;
 mod pairs;
 mod pockets;
+mod rules;
 mod span;
 mod standing;
 
@@ -34,17 +37,20 @@ pub(crate) use contact::Labelled;
 use contact::LayerContact;
 use drain::Drain;
 pub use findings::{
-    Findings, HeldAt, Island, IslandEnd, LayerFacts, Listed, OffBalance, Overhang, Pocket,
-    PocketEffect, PocketKind, Region, WeakJoint,
+    Findings, HeldAt, Island, IslandEnd, LayerFacts, Listed, NarrowFeature, OffBalance, Overhang,
+    Pocket, PocketEffect, PocketKind, Region, WeakJoint,
 };
 use islands::{Growth, Speck};
 use liquid::Liquid;
 pub(crate) use metric::Metric;
+use narrow::narrow;
+use narrows::{Breach, Narrows};
 use overhang::OverhangLimit;
 pub(crate) use overhang::without;
 use overhangs::Overhangs;
 pub use pairs::{Disagreements, IslandMinimum, LoneMinimum};
 use pockets::Hollows;
+pub use rules::{DesignRules, LeastWidthRule, RuleError};
 pub(crate) use standing::Standing;
 
 /// Limits from which something counts as a finding.
@@ -67,8 +73,42 @@ pub struct CheckOptions {
     pub max_overhang: Option<Length>,
     /// The width that a way out must have to drain a pocket; if `None`, a pixel and a layer do.
     pub drain: Option<Length>,
+    /// The design rules by which features are too narrow.
+    pub widths: Vec<WidthRule>,
     /// Whether to look for islands alone.
     pub islands_only: bool,
+}
+
+/// A design rule: how wide features must be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WidthRule {
+    /// Its name.
+    pub name: String,
+    /// Where it is from.
+    pub source: String,
+    /// Whether it is about white: walls and pins. Others are about slots and holes.
+    pub is_of_white: bool,
+    /// The least width.
+    pub least: LeastWidth,
+}
+
+/// The least width of a feature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LeastWidth {
+    /// A length. It needs a stack with a resolution.
+    Length(Length),
+    /// A number of widths of a pixel.
+    Pixels(f64),
+}
+
+impl LeastWidth {
+    /// Returns the width in widths of a pixel; none if it is not known.
+    pub(crate) fn widths(self, pitch: Option<Pitch>) -> Option<f64> {
+        match self {
+            Self::Length(length) => Some(length.pixels(pitch?.x)),
+            Self::Pixels(pixels) => Some(pixels),
+        }
+    }
 }
 
 impl Default for CheckOptions {
@@ -82,6 +122,7 @@ impl Default for CheckOptions {
             least_support: 0.25,
             max_overhang: None,
             drain: None,
+            widths: Vec::new(),
             islands_only: false,
         }
     }
@@ -337,6 +378,7 @@ struct LabeledLayer {
     pitch: Option<Pitch>,
     origin_mm: Option<[f64; 2]>,
     labelled: Labelled,
+    breaches: Vec<Breach>,
 }
 
 impl LabeledLayer {
@@ -346,12 +388,39 @@ impl LabeledLayer {
         let mut facts = LayerFacts::new(&info);
         facts.has_white = labelled.of_colour(true).next().is_some();
         facts.white_at_border = labelled.of_colour(true).any(|white| labelled.reaches_frame(white));
-        Self { facts, name: info.name(), pitch, origin_mm: info.origin_mm, labelled }
+        let breaches = breaches(&labelled, pitch, options);
+        Self { facts, name: info.name(), pitch, origin_mm: info.origin_mm, labelled, breaches }
     }
 
     fn size(&self) -> [u32; 2] {
         [self.labelled.mask.width(), self.labelled.mask.height()]
     }
+}
+
+/// The least difference from a limit in widths of a pixel: less is rounding.
+const LESS: f64 = 0.5;
+
+/// Returns the places of a layer that break rules of widths, each with the rule of the least width.
+fn breaches(layer: &Labelled, pitch: Option<Pitch>, options: &CheckOptions) -> Vec<Breach> {
+    if options.islands_only {
+        return Vec::new();
+    }
+    let of_rule = |rule: &WidthRule| rule.least.widths(pitch);
+    let limits = [true, false].map(|is_white| {
+        let rules = options.widths.iter().filter(|rule| rule.is_of_white == is_white);
+        rules.filter_map(of_rule).reduce(f64::max)
+    });
+    let places = narrow(layer, limits, Metric::of(pitch));
+    let breach = |place: narrow::Narrow| {
+        let rules = options.widths.iter().enumerate();
+        let (limit, rule) = rules
+            .filter(|(_, rule)| rule.is_of_white == place.is_white)
+            .filter_map(|(number, rule)| Some((of_rule(rule)?, number)))
+            .filter(|(limit, _)| place.width + LESS <= *limit)
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Breach { place, rule, limit })
+    };
+    places.into_iter().filter_map(breach).collect()
 }
 
 /// The state of a check after the layers so far.
@@ -365,6 +434,7 @@ struct Checker {
     liquid: Liquid,
     drain: Option<(Drain, Hollows)>,
     overhangs: Overhangs,
+    narrows: Narrows,
     weak_joints: Listed<WeakJoint>,
 }
 
@@ -388,6 +458,7 @@ impl Checker {
             liquid: Liquid::new(rounding),
             drain: drain.transpose()?,
             overhangs: Overhangs::new(options.least_overhang(pitch)),
+            narrows: Narrows::new(options.speck_layers.get(), pitch.map(|pitch| pitch.um()[0])),
             weak_joints: Listed::default(),
         })
     }
@@ -430,6 +501,7 @@ impl Checker {
             return Ok(());
         }
         self.liquid.add(&layer.labelled, contact, number, thickness_um);
+        self.narrows.add(&layer.breaches, number, layer.facts.thickness_um);
         if let Some(contact) = contact {
             self.add_weak_joints(&layer.labelled, contact, number);
             // On a slope, patches of neighboring layers may be a limit and a pixel apart.
@@ -473,6 +545,7 @@ impl Checker {
         self.growth.finish();
         self.liquid.finish();
         self.overhangs.finish();
+        self.narrows.finish();
         let narrow = self.drain.map(|(drain, hollows)| drain.finish(hollows)).unwrap_or_default();
         let mut pockets = self.liquid.pockets;
         narrow.list.into_iter().for_each(|pocket| pockets.push(pocket));
@@ -482,11 +555,13 @@ impl Checker {
             pitch: self.pitch,
             origin_mm: self.origin_mm,
             size: self.size,
+            widths: self.options.widths,
             islands: self.growth.islands,
             specks: self.growth.specks,
             weak_joints: self.weak_joints,
             overhangs: self.overhangs.ended,
             pockets,
+            narrow: self.narrows.ended,
             off_balance: self.growth.off_balance,
         };
         findings.sort();

@@ -7,12 +7,12 @@ use lamp_stack::to_nm;
 use super::scale::Scale;
 use super::{
     BorderRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingRecord, FoundPixels,
-    IslandRecord, Joined, JointRecord, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord,
-    PocketRecord, Shown, ShownMoment, StrayRowsRecord,
+    IslandRecord, Joined, JointRecord, MinimumRecord, NarrowRecord, OffBalanceRecord,
+    OverhangRecord, PartWord, PocketRecord, Shown, ShownMoment, StrayRowsRecord,
 };
 use crate::check::{
-    Disagreements, Findings, Island, IslandEnd, LayerFacts, LoneMinimum, Metric, OffBalance,
-    Overhang, Pocket, PocketKind, Region, WeakJoint,
+    Disagreements, Findings, Island, IslandEnd, LayerFacts, LoneMinimum, Metric, NarrowFeature,
+    OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint,
 };
 
 /// Returns the records of all findings, the worst first, given the shear stress of the recoating
@@ -37,6 +37,7 @@ pub fn records(
     records.extend(findings.pockets.list.iter().map(|pocket| of_pocket(pocket, scale)));
     let overhang = |overhang: &Overhang| Record::Overhang(of_overhang(overhang, scale));
     records.extend(findings.overhangs.list.iter().map(overhang));
+    records.extend(findings.narrow.list.iter().map(|narrow| of_narrow(narrow, findings, scale)));
     // Less is rounding to pixels.
     let least = Metric::of(findings.pitch).longer_side();
     let off = findings.off_balance.list.iter().filter(|off| off.off_pixels >= least);
@@ -195,6 +196,38 @@ fn of_overhang(overhang: &Overhang, scale: &Scale<'_>) -> OverhangRecord {
             ..shown(overhang.reach_layer, &overhang.region, FoundPixels::Unheld, scale)
         },
     }
+}
+
+fn of_narrow(narrow: &NarrowFeature, findings: &Findings, scale: &Scale<'_>) -> FindingRecord {
+    let rule = &findings.widths[narrow.rule];
+    let least = rule.least.widths(findings.pitch).unwrap_or_default();
+    let length = |widths: f64| (widths, scale.length_mm(widths));
+    let ((width_px, width_mm), (length_px, length_mm)) =
+        (length(narrow.width), length(narrow.length));
+    let (least_px, least_mm) = length(least);
+    let pixels = if narrow.is_white { FoundPixels::White } else { FoundPixels::Black };
+    let record = NarrowRecord {
+        layers: scale.span(narrow.layers),
+        at: scale.point(narrow.at.map(|place| f64::from(place) + 0.5)),
+        bounds: scale.bounds(&narrow.region),
+        width_px,
+        width_mm,
+        narrowest_layer: scale.layer(narrow.narrowest_layer).layer,
+        length_px,
+        length_mm,
+        is_long: narrow.is_long(),
+        rule: rule.name.clone(),
+        source: rule.source.clone(),
+        least_px,
+        least_mm,
+        shown: Shown {
+            layers: narrow.layers,
+            at: narrow.at,
+            marked: narrow.runs.clone(),
+            ..shown(narrow.narrowest_layer, &narrow.region, pixels, scale)
+        },
+    };
+    if narrow.is_white { FindingRecord::Thin(record) } else { FindingRecord::Slot(record) }
 }
 
 fn of_balance(off: &OffBalance, scale: &Scale<'_>) -> OffBalanceRecord {

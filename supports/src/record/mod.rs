@@ -8,6 +8,8 @@ mod places;
 mod scale;
 mod texts;
 
+use std::ops::Range;
+
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -49,6 +51,10 @@ pub enum FindingRecord {
     Narrow(PocketRecord),
     /// White that reaches far beyond the white below.
     Overhang(OverhangRecord),
+    /// White that is narrower than a design rule allows.
+    Thin(NarrowRecord),
+    /// Black that is narrower than a design rule allows.
+    Slot(NarrowRecord),
     /// A body whose center of gravity leaves its base.
     OffBalance(OffBalanceRecord),
     /// A copy that differs from the others of its part.
@@ -70,6 +76,8 @@ pub enum FindingGroup {
     Pockets,
     /// White far from the white below.
     Overhangs,
+    /// Features that break a design rule.
+    Rules,
     /// Centers of gravity off their base.
     Balance,
     /// Stray rows, copies that differ, white at the border, empty layers.
@@ -81,6 +89,7 @@ lamp_stack::named!(FindingGroup {
     Joints = "joints",
     Pockets = "pockets",
     Overhangs = "overhangs",
+    Rules = "rules",
     Balance = "balance",
     Layers = "layers",
 });
@@ -116,6 +125,8 @@ pub struct Shown {
     pub whole: Region,
     /// The column and the row of a vertical section through it.
     pub at: [u32; 2],
+    /// The rows and columns that are marked in the layer, from the top, if they are no component.
+    pub marked: Vec<(u32, Range<u32>)>,
     /// The pixels that a section marks.
     pub pixels: FoundPixels,
     /// Other layers that show what becomes of it.
@@ -336,6 +347,46 @@ pub struct OverhangRecord {
     pub shown: Shown,
 }
 
+/// White or black that is narrower than a design rule allows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(default)]
+pub struct NarrowRecord {
+    /// The layers.
+    #[serde(flatten)]
+    pub layers: LayerSpan,
+    /// A pixel where it is narrowest.
+    #[serde(flatten)]
+    pub at: PointRecord,
+    /// The rectangle around all.
+    #[serde(flatten)]
+    pub bounds: BoxRecord,
+    /// The least width of a layer, in widths of a pixel: of each layer, the width that a tenth of its
+    /// middle line is below or at.
+    pub width_px: f64,
+    /// The same in millimeters.
+    pub width_mm: Option<f64>,
+    /// The index of the first layer that is so narrow.
+    pub narrowest_layer: u32,
+    /// The greatest length in a layer, its area over its width, in widths of a pixel.
+    pub length_px: f64,
+    /// The same in millimeters.
+    pub length_mm: Option<f64>,
+    /// Whether it is long in a layer: a wall or a slot, and no pin or hole.
+    pub is_long: bool,
+    /// The name of the rule that it breaks.
+    pub rule: String,
+    /// Where the rule is from.
+    pub source: String,
+    /// The least width by the rule, in widths of a pixel.
+    pub least_px: f64,
+    /// The same in millimeters.
+    pub least_mm: Option<f64>,
+    /// The picture of it, which JSON does not have.
+    #[serde(skip)]
+    pub shown: Shown,
+}
+
 /// A body whose center of gravity leaves its base as it is built.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -448,6 +499,8 @@ mod tests {
             FindingRecord::Sealed(pocket()),
             FindingRecord::Narrow(pocket()),
             FindingRecord::Overhang(OverhangRecord::default()),
+            FindingRecord::Thin(NarrowRecord::default()),
+            FindingRecord::Slot(NarrowRecord::default()),
             FindingRecord::OffBalance(OffBalanceRecord::default()),
             FindingRecord::CopyDiffers(CopyRecord::default()),
             FindingRecord::Border(BorderRecord::default()),

@@ -6,7 +6,7 @@ use super::places::{area_text, length_text, significant, volume_text};
 use super::{
     BoxRecord, CopyRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingGroup,
     FindingRecord, FoundPixels, IslandRecord, Joined, JointRecord, LayerPlace, LayerSpan,
-    MinimumRecord, OffBalanceRecord, OverhangRecord, PocketRecord, Shown,
+    MinimumRecord, NarrowRecord, OffBalanceRecord, OverhangRecord, PocketRecord, Shown,
 };
 
 impl FindingRecord {
@@ -23,6 +23,10 @@ impl FindingRecord {
             Self::Sealed(_) => "sealed pocket",
             Self::Narrow(_) => "narrow pocket",
             Self::Overhang(_) => "overhang",
+            Self::Thin(thin) if thin.is_long => "thin wall",
+            Self::Thin(_) => "thin pin",
+            Self::Slot(slot) if slot.is_long => "narrow slot",
+            Self::Slot(_) => "narrow hole",
             Self::OffBalance(_) => "off balance",
             Self::CopyDiffers(_) => "differing copy",
             Self::Border(_) => "border",
@@ -43,6 +47,8 @@ impl FindingRecord {
             Self::Sealed(_) => "sealed",
             Self::Narrow(_) => "narrow",
             Self::Overhang(_) => "overhang",
+            Self::Thin(_) => "thin",
+            Self::Slot(_) => "slot",
             Self::OffBalance(_) => "off-balance",
             Self::CopyDiffers(_) => "copy-differs",
             Self::Border(_) => "border",
@@ -61,6 +67,7 @@ impl FindingRecord {
                 FindingGroup::Pockets
             }
             Self::Overhang(_) => FindingGroup::Overhangs,
+            Self::Thin(_) | Self::Slot(_) => FindingGroup::Rules,
             Self::OffBalance(_) => FindingGroup::Balance,
             Self::StrayRows(_) | Self::CopyDiffers(_) | Self::Border(_) | Self::Empty(_) => {
                 FindingGroup::Layers
@@ -83,6 +90,7 @@ impl FindingRecord {
             | Self::Sealed(pocket)
             | Self::Narrow(pocket) => Some(&pocket.shown),
             Self::Overhang(overhang) => Some(&overhang.shown),
+            Self::Thin(narrow) | Self::Slot(narrow) => Some(&narrow.shown),
             _ => None,
         }
     }
@@ -90,8 +98,10 @@ impl FindingRecord {
     /// Returns the pixels that it is about.
     pub fn pixels(&self) -> FoundPixels {
         match self {
-            Self::Island(_) | Self::WeakJoint(_) => FoundPixels::White,
-            Self::Trap(_) | Self::Cup(_) | Self::Sealed(_) | Self::Narrow(_) => FoundPixels::Black,
+            Self::Island(_) | Self::WeakJoint(_) | Self::Thin(_) => FoundPixels::White,
+            Self::Trap(_) | Self::Cup(_) | Self::Sealed(_) | Self::Narrow(_) | Self::Slot(_) => {
+                FoundPixels::Black
+            }
             Self::Overhang(_) => FoundPixels::Unheld,
             _ => FoundPixels::All,
         }
@@ -111,6 +121,7 @@ impl FindingRecord {
             | Self::Sealed(pocket)
             | Self::Narrow(pocket) => span(&pocket.layers),
             Self::Overhang(overhang) => span(&overhang.layers),
+            Self::Thin(narrow) | Self::Slot(narrow) => span(&narrow.layers),
             Self::OffBalance(off) => one(&off.layer),
             Self::StrayRows(rows) => span(&rows.layers),
             Self::CopyDiffers(copy) => span(&copy.layers),
@@ -131,6 +142,7 @@ impl FindingRecord {
             | Self::Sealed(pocket)
             | Self::Narrow(pocket) => pocket.layers.z_mm,
             Self::Overhang(overhang) => overhang.layers.z_mm,
+            Self::Thin(narrow) | Self::Slot(narrow) => narrow.layers.z_mm,
             Self::OffBalance(off) => off.layer.z_mm,
             Self::StrayRows(rows) => rows.layers.z_mm,
             Self::CopyDiffers(copy) => copy.layers.z_mm,
@@ -149,6 +161,7 @@ impl FindingRecord {
             | Self::Sealed(pocket)
             | Self::Narrow(pocket) => Some(pocket.bounds.clone()),
             Self::Overhang(overhang) => Some(overhang.bounds.clone()),
+            Self::Thin(narrow) | Self::Slot(narrow) => Some(narrow.bounds.clone()),
             Self::OffBalance(off) => {
                 Some(BoxRecord { box_mm: off.base_box_mm, box_px: off.base_box_px })
             }
@@ -168,6 +181,7 @@ impl FindingRecord {
             Self::Island(island) => Some(island.at.at_px),
             Self::WeakJoint(joint) => Some(joint.at.at_px),
             Self::Overhang(overhang) => Some(overhang.at.at_px),
+            Self::Thin(narrow) | Self::Slot(narrow) => Some(narrow.at.at_px),
             Self::OffBalance(off) => Some(off.at.at_px),
             _ => None,
         }
@@ -202,6 +216,9 @@ impl FindingRecord {
                     (None, reach) => reach.map(|mm| number(mm, "mm beyond the layer below")),
                 },
             ],
+            Self::Thin(narrow) | Self::Slot(narrow) => {
+                vec![Some(narrow.width_text()), Some(format!("rule {}", narrow.rule))]
+            }
             Self::OffBalance(off) => vec![off.off_mm.map(|mm| number(mm, "mm off its base"))],
             _ => Vec::new(),
         };
@@ -278,6 +295,9 @@ impl fmt::Display for Sentence<'_> {
             }
             FindingRecord::Overhang(overhang) => {
                 overhang.write(f, &self.layers(format_args!("{} ", overhang.layers)))
+            }
+            FindingRecord::Thin(narrow) | FindingRecord::Slot(narrow) => {
+                narrow.write(f, &self.layers(format_args!("{} ", narrow.layers)))
             }
             FindingRecord::OffBalance(off) => {
                 off.write(f, &self.layers(format_args!("from {} on ", off.layer)))
@@ -405,6 +425,27 @@ impl OverhangRecord {
     }
 }
 
+impl NarrowRecord {
+    /// Returns its width, and of walls and slots the length, as text.
+    fn width_text(&self) -> String {
+        let width = length_text(self.width_px, self.width_mm);
+        if !self.is_long {
+            return format!("{width} wide");
+        }
+        format!("{width} wide and {} long", length_text(self.length_px, self.length_mm))
+    }
+
+    fn write(&self, f: &mut fmt::Formatter<'_>, place: &str) -> fmt::Result {
+        let Self { layers, at, rule, source, .. } = self;
+        write!(f, "{place}at {at}: {}", self.width_text())?;
+        if layers.layer != layers.last_layer {
+            write!(f, " in layer {}", self.narrowest_layer)?;
+        }
+        let least = length_text(self.least_px, self.least_mm);
+        write!(f, ", less than the {least} of rule {rule} ({source})")
+    }
+}
+
 impl OffBalanceRecord {
     fn write(&self, f: &mut fmt::Formatter<'_>, layers: &str) -> fmt::Result {
         let Self { worst_layer, at, .. } = self;
@@ -437,6 +478,8 @@ mod tests {
             (span("sealed"), "layers 80 to 96 "),
             (span("narrow"), "layers 80 to 96 "),
             (span("overhang"), "layers 80 to 96 "),
+            (span("thin"), "layers 80 to 96 "),
+            (span("slot"), "layers 80 to 96 "),
             (span("off-balance"), "from layer 80 (z 8.00 mm) on "),
             (span("stray-rows"), "layers 80 to 96: "),
             (span("copy-differs"), " in layers 80 to 96"),

@@ -57,6 +57,7 @@ pub(crate) fn check(layers: Vec<Layer>, limits: &Limits) -> Findings {
         max_overhang: limits.max_overhang_um.map(Length::from_um),
         drain: limits.drain_um.map(Length::from_um),
         islands_only: false,
+        widths: Vec::new(),
     };
     let layers = layers.into_iter().map(Ok::<_, CheckError>);
     check_layers(layers, Ok, &options).unwrap()

@@ -4,6 +4,7 @@ mod agree;
 mod at_scale;
 mod blocks;
 mod drawn;
+mod narrow;
 mod parts;
 mod random_parts;
 mod referee;

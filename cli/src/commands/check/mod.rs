@@ -40,8 +40,8 @@ use report::write_report;
 /// Find features that would be swept away, trap resin or bend as a stack is built
 ///
 /// An island is a white area that rests on nothing: the recoating blade sweeps it away. Each island
-/// gets a line, as do weak joints, pockets that hold resin, overhangs, unbalanced bodies, white at
-/// the border and empty layers; the worst come first. A part is sliced first, with the options of
+/// gets a line, as do weak joints, pockets that hold resin, overhangs, features narrower than design
+/// rules allow, unbalanced bodies, white at the border and empty layers; the worst come first. A part is sliced first, with the options of
 /// `slice`; its mesh also shows where islands must be. Only the report lists effects of rounding to
 /// pixels, and islands that are neither as wide as --speck nor float for --speck-layers.
 #[derive(Args, Clone)]
@@ -188,7 +188,8 @@ impl CheckArgs {
                     progress.layer_done();
                     Ok::<_, Exit>(layer)
                 };
-                let findings = lamp_supports::check(layers, decode, &self.settings.options())?;
+                let options = self.settings.options()?;
+                let findings = lamp_supports::check(layers, decode, &options)?;
                 let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
                 let build = Err(Inseparable::NoBuild);
                 self.settings.found(findings, &disagreements, Vec::new(), build, machine)

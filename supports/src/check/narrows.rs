@@ -1,0 +1,146 @@
+//! Follows narrow places from layer to layer: one pin, fin, slot or hole is one finding.
+
+use lamp_stack::sets::{root, unite};
+
+use super::findings::{Listed, NarrowFeature};
+use super::narrow::Narrow;
+
+/// The least height of a narrow feature, as a share of its rule's limit: a wedge of 60 degrees is lower
+/// where it is narrower, as where slopes begin and end.
+const LEAST_HEIGHT: f64 = 0.75;
+
+/// A narrow place of a layer, and the rule that it breaks.
+#[derive(Clone, Debug)]
+pub(super) struct Breach {
+    pub(super) place: Narrow,
+    /// The number of the rule in the options.
+    pub(super) rule: usize,
+    /// The rule's limit in widths of a pixel.
+    pub(super) limit: f64,
+}
+
+/// The narrow features of the layers so far.
+#[derive(Debug, Default)]
+pub(super) struct Narrows {
+    /// The number of layers of which a feature has some, where heights are not known.
+    least_layers: u32,
+    /// The width of a pixel in micrometers, if it is known.
+    pixel_um: Option<f64>,
+    /// The last layer's runs with the numbers of their features in `open`, sorted.
+    last: Vec<(u32, u32, u32, usize)>,
+    open: Vec<Growing>,
+    pub(super) ended: Listed<NarrowFeature>,
+}
+
+/// A feature that may go on.
+#[derive(Clone, Debug)]
+struct Growing {
+    feature: NarrowFeature,
+    limit: f64,
+    /// The sum of its layers' thicknesses, if all are known.
+    height_um: Option<f64>,
+}
+
+impl Narrows {
+    pub(super) fn new(least_layers: u32, pixel_um: Option<f64>) -> Self {
+        Self { least_layers, pixel_um, ..Self::default() }
+    }
+
+    /// Adds a layer's places. Those that have pixels of a color in common with places of the last layer
+    /// continue them.
+    pub(super) fn add(&mut self, breaches: &[Breach], number: u32, thickness_um: Option<f64>) {
+        if breaches.is_empty() && self.open.is_empty() {
+            return;
+        }
+        let mut all = std::mem::take(&mut self.open);
+        let before = all.len();
+        all.extend(breaches.iter().map(|breach| Growing::new(breach, number, thickness_um)));
+        let mut parents: Vec<u32> = (0..all.len() as u32).collect();
+        let mut runs: Vec<_> = (before..)
+            .zip(breaches)
+            .flat_map(|(own, breach)| {
+                let runs = breach.place.runs.iter();
+                runs.map(move |(row, run)| (*row, run.start, run.end, own))
+            })
+            .collect();
+        runs.sort_unstable();
+        let (mut i, mut j) = (0, 0);
+        while let (Some(a), Some(b)) = (self.last.get(i), runs.get(j)) {
+            let alike = all[a.3].feature.is_white == all[b.3].feature.is_white;
+            if a.0 == b.0 && a.1.max(b.1) < a.2.min(b.2) && alike {
+                unite(&mut parents, a.3 as u32, b.3 as u32);
+            }
+            if (a.0, a.2) <= (b.0, b.2) { i += 1 } else { j += 1 }
+        }
+        let mut root_of = |item: usize| root(&mut parents, item as u32) as usize;
+        let mut kept: Vec<usize> = (before..all.len()).map(&mut root_of).collect();
+        kept.sort_unstable();
+        kept.dedup();
+        let mut merged: Vec<Option<Growing>> = vec![None; all.len()];
+        for (k, growing) in all.into_iter().enumerate() {
+            match &mut merged[root_of(k)] {
+                Some(first) => first.unite(growing),
+                none => *none = Some(growing),
+            }
+        }
+        let place = |root: usize| kept.binary_search(&root).expect("it is kept");
+        runs.iter_mut().for_each(|run| run.3 = place(root_of(run.3)));
+        self.last = runs;
+        self.open = kept.iter().filter_map(|&k| merged[k].take()).collect();
+        merged.into_iter().flatten().for_each(|growing| self.end(growing));
+    }
+
+    /// Ends all features.
+    pub(super) fn finish(&mut self) {
+        std::mem::take(&mut self.open).into_iter().for_each(|growing| self.end(growing));
+    }
+
+    /// Lists a feature, unless it is the low edge of something wider.
+    fn end(&mut self, growing: Growing) {
+        let [first, last] = growing.feature.layers;
+        let is_high = match growing.height_um.zip(self.pixel_um) {
+            Some((height_um, pixel_um)) => height_um > LEAST_HEIGHT * growing.limit * pixel_um,
+            None => last - first + 1 >= self.least_layers,
+        };
+        if is_high {
+            self.ended.push(growing.feature);
+        }
+    }
+}
+
+impl Growing {
+    fn new(breach: &Breach, layer: u32, height_um: Option<f64>) -> Self {
+        let Breach { place, rule, limit } = breach;
+        let feature = NarrowFeature {
+            is_white: place.is_white,
+            rule: *rule,
+            layers: [layer; 2],
+            width: place.width,
+            narrowest_layer: layer,
+            at: place.at,
+            length: place.length,
+            region: place.region.clone(),
+            runs: place.runs.clone(),
+        };
+        Self { feature, limit: *limit, height_um }
+    }
+
+    fn unite(&mut self, other: Self) {
+        let Self { feature, limit, height_um } = other;
+        let own = &mut self.feature;
+        let is_later = feature.layers[0] > own.layers[1];
+        own.layers = [own.layers[0].min(feature.layers[0]), own.layers[1].max(feature.layers[1])];
+        own.length = own.length.max(feature.length);
+        own.region.unite(&feature.region);
+        if feature.width < own.width {
+            (own.width, own.at, own.runs) = (feature.width, feature.at, feature.runs);
+            (own.rule, own.narrowest_layer) = (feature.rule, feature.narrowest_layer);
+            self.limit = limit;
+        }
+        self.height_um = match (self.height_um, height_um) {
+            (Some(own), Some(other)) if is_later => Some(own + other),
+            (Some(own), Some(other)) => Some(own.max(other)),
+            _ => None,
+        };
+    }
+}

@@ -1,0 +1,166 @@
+//! Design rules as TOML files (002 section 6.2 e asks for rules of the process).
+
+use std::collections::HashSet;
+
+use lamp_stack::{Builtin, Catalogued, Length, LengthError, nonempty_text};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+use thiserror::Error;
+
+use super::{LeastWidth, WidthRule};
+
+/// Design rules, by which features are too narrow for a process.
+///
+/// ```
+/// use lamp_stack::Catalogued;
+/// use lamp_supports::DesignRules;
+///
+/// let rules = DesignRules::builtin("lamp-mould").unwrap();
+/// assert_eq!(rules.widths().count(), 3);
+/// ```
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DesignRules {
+    /// Their name, for commands: small letters, digits and `-`.
+    pub name: String,
+    /// What they are for, in a line.
+    #[serde(deserialize_with = "nonempty_text")]
+    pub description: String,
+    /// How wide walls and pins must be.
+    #[serde(default)]
+    pub thin: Vec<LeastWidthRule>,
+    /// How wide slots and holes must be.
+    #[serde(default)]
+    pub slot: Vec<LeastWidthRule>,
+}
+
+/// A rule of a width: one of the widths is given.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct LeastWidthRule {
+    /// Its name, for findings.
+    #[serde(deserialize_with = "nonempty_text")]
+    pub name: String,
+    /// The least width.
+    #[serde(default, deserialize_with = "some_length")]
+    pub least: Option<Length>,
+    /// The least width in widths of a pixel.
+    pub least_px: Option<f64>,
+    /// Where it is from.
+    #[serde(deserialize_with = "nonempty_text")]
+    pub source: String,
+}
+
+/// Why rules contradict each other.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum RuleError {
+    /// A rule has no width, or several.
+    #[error("rule {0}: give least or least-px")]
+    Width(String),
+    /// A width is no number above zero.
+    #[error("rule {0}: the width must be above zero, and no more than 30000 pixels or 1 m")]
+    NotPositive(String),
+    /// Two rules have one name.
+    #[error("rule {0} is there twice: give it another name")]
+    Twice(String),
+}
+
+/// The greatest widths: wider than any image.
+const MOST_PIXELS: f64 = 30_000.0;
+const MOST_MM: f64 = 1000.0;
+
+impl DesignRules {
+    /// Returns the rules of widths.
+    pub fn widths(&self) -> impl Iterator<Item = WidthRule> {
+        let of_color = |rules: &'_ [LeastWidthRule], is_of_white: bool| {
+            let rule = move |rule: &LeastWidthRule| {
+                let LeastWidthRule { name, source, least, least_px } = rule;
+                let least = least.map(LeastWidth::Length).or(least_px.map(LeastWidth::Pixels))?;
+                Some(WidthRule { name: name.clone(), source: source.clone(), is_of_white, least })
+            };
+            rules.iter().filter_map(rule).collect::<Vec<_>>()
+        };
+        of_color(&self.thin, true).into_iter().chain(of_color(&self.slot, false))
+    }
+}
+
+macro_rules! builtin {
+    ($name:literal) => {
+        Builtin { name: $name, toml: include_str!(concat!("../../rules/", $name, ".toml")) }
+    };
+}
+
+impl Catalogued for DesignRules {
+    const KIND: &'static str = "rule";
+    const BUILTINS: &'static [Builtin] = &[builtin!("lamp-mould"), builtin!("none")];
+    type CheckError = RuleError;
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn check(&self) -> Result<(), RuleError> {
+        let mut names = HashSet::new();
+        for rule in self.thin.iter().chain(&self.slot) {
+            let is_valid = match (rule.least, rule.least_px) {
+                (Some(least), None) => least.um() > 0.0 && least.mm() <= MOST_MM,
+                (None, Some(pixels)) => pixels > 0.0 && pixels <= MOST_PIXELS,
+                _ => return Err(RuleError::Width(rule.name.clone())),
+            };
+            if !is_valid {
+                return Err(RuleError::NotPositive(rule.name.clone()));
+            }
+            if !names.insert(&rule.name) {
+                return Err(RuleError::Twice(rule.name.clone()));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn some_length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Length>, D::Error> {
+    let text = String::deserialize(from)?;
+    text.parse().map(Some).map_err(|error: LengthError| D::Error::custom(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_rules_are_those_of_the_source() {
+        let names: Vec<String> = DesignRules::builtins().map(|rules| rules.name).collect();
+        assert_eq!(names, ["lamp-mould", "none"]);
+        let rules = DesignRules::builtin("lamp-mould").unwrap();
+        let widths: Vec<WidthRule> = rules.widths().collect();
+        // 25 pixels of 1/1500 inch, and 500 um.
+        let LeastWidth::Length(pixels) = widths[0].least else { panic!("{:?}", widths[0]) };
+        assert!((pixels.um() - 25.0 * 25_400.0 / 1500.0).abs() < 0.5, "{pixels}");
+        assert_eq!(widths[1].least, LeastWidth::Length(Length::from_um(500.0)));
+        assert_eq!(DesignRules::builtin("none").unwrap().widths().count(), 0);
+    }
+
+    #[test]
+    fn wrong_rules_are_refused_by_their_names() {
+        let rule = |lines: &str| {
+            let text = format!("name = 'a'\ndescription = 'b'\n[[thin]]\nname = 'c'\nsource = 'd'");
+            DesignRules::from_toml(&format!("{text}\n{lines}")).unwrap_err().to_string()
+        };
+        for (lines, why) in [
+            ("", "rule c: give least or least-px"),
+            ("least = '1mm'\nleast-px = 3", "rule c: give least or least-px"),
+            ("least-px = 0", "above zero"),
+            ("least-px = nan", "above zero"),
+            ("least = '-2um'", "above zero"),
+            ("least = '2 parsec'", "line 6"),
+            ("most = 3", "line 6: thin[0]: unknown key"),
+            (
+                "least-px = 3\n[[slot]]\nname = 'c'\nsource = 'd'\nleast-px = 3",
+                "rule c is there twice",
+            ),
+        ] {
+            assert!(rule(lines).contains(why), "{lines}: {}", rule(lines));
+        }
+    }
+}
