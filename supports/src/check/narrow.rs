@@ -36,7 +36,7 @@ const CHORD: f64 = 1.5;
 /// The least extent of chords that follow each other between wider ones, in radii.
 const LEAST_NECK: f64 = 0.2;
 
-/// The same where they begin or end at a tip: that of a fin of the least reach, at 45 degrees.
+/// The same where they begin or end at a tip: a fin of the least reach has it at 45 degrees.
 const LEAST_TIP: f64 = 1.55;
 
 /// How far around chords discs are tried, in radii. They have centers up to two radii away, and what is
@@ -127,7 +127,7 @@ fn chords(mask: &Mask, least: [f64; 2]) -> Vec<Chord> {
         }
         if number > 0 && in_step(above, row) {
             for (k, (&upper, &lower)) in above.iter().zip(row).enumerate() {
-                // White begins at even transitions: what is passed later has the color before it.
+                // White begins at even transitions: an edge that moves right ends white there.
                 let is_white = (k % 2 == 0) == (upper < lower);
                 let columns = upper.min(lower)..upper.max(lower);
                 end(&mut since, columns, number, is_white, rows, &mut chords);
@@ -214,7 +214,7 @@ fn around(limit: f64, metric: Metric) -> [u32; 2] {
 fn chains(mask: &Mask, mut chords: Vec<&Chord>, radius: f64, windows: &mut Vec<Region>) {
     let key = |chord: &Chord| chord.lines().map(|range| range.start);
     chords.sort_unstable_by_key(|chord| key(chord));
-    // Of chords that are side by side, those that end where others begin are followed by them.
+    // A chord follows the chords that end where it begins, and that it overlaps.
     let mut by_end: Vec<u32> = (0..chords.len() as u32).collect();
     let ends = |at: &u32| {
         let [lines, along] = chords[*at as usize].lines();
@@ -582,7 +582,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
 
-        /// The distance to the nearest black pixel is that of all black pixels tried.
+        /// The distance to the nearest black pixel is the least to all black pixels.
         #[test]
         fn clearances_are_those_of_a_distance_transform(
             white in prop::collection::vec(prop::bool::weighted(0.95), 20 * 20),

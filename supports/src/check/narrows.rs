@@ -46,8 +46,8 @@ impl Narrows {
         Self { least_layers, pixel_um, ..Self::default() }
     }
 
-    /// Adds a layer's places. Those that have pixels of a color in common with places of the last layer
-    /// continue them.
+    /// Adds a layer's places. A place continues the places of the last layer with which it has pixels of
+    /// a color in common.
     pub(super) fn add(&mut self, breaches: &[Breach], number: u32, thickness_um: Option<f64>) {
         if breaches.is_empty() && self.open.is_empty() {
             return;

@@ -23,7 +23,7 @@ use super::{LeastWidth, WidthRule};
 pub struct DesignRules {
     /// Their name, for commands: small letters, digits and `-`.
     pub name: String,
-    /// What they are for, in a line.
+    /// Their purpose, in a line.
     #[serde(deserialize_with = "nonempty_text")]
     pub description: String,
     /// How wide walls and pins must be.
