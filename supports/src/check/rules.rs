@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn wrong_rules_are_refused_by_their_names() {
         let rule = |lines: &str| {
-            let text = format!("name = 'a'\ndescription = 'b'\n[[thin]]\nname = 'c'\nsource = 'd'");
+            let text = "name = 'a'\ndescription = 'b'\n[[thin]]\nname = 'c'\nsource = 'd'";
             DesignRules::from_toml(&format!("{text}\n{lines}")).unwrap_err().to_string()
         };
         for (lines, why) in [
