@@ -10,7 +10,7 @@ use lamp_machine::{Machine, Recoating};
 use lamp_stack::{Layer, Length, Mask, MemorySize};
 use lamp_supports::{
     AcceptedFindings, CheckError, CheckOptions, CopyRecord, DesignRules, Disagreements, Feature,
-    FindingGroup, FindingRecord, Findings, Listed, Region, Scale, Severity,
+    FindingGroup, FindingRecord, Findings, LeastWidth, Listed, Region, Scale, Severity, WidthRule,
 };
 use serde::{Deserialize, Serialize};
 
@@ -334,6 +334,17 @@ impl Found {
     pub fn whole_build(&self) -> Option<String> {
         let why = self.build.as_ref().err().filter(|why| **why != Inseparable::NoBuild)?;
         Some(format!("each copy and the build mesh were checked as they stand: {why}"))
+    }
+
+    /// Returns why some design rules were not checked, if there are any.
+    pub fn unchecked_rules(&self) -> Option<String> {
+        let needs_length = |rule: &&WidthRule| matches!(rule.least, LeastWidth::Length(_));
+        let rules = self.findings.widths.iter().filter(needs_length);
+        let names: Vec<&str> = rules.map(|rule| rule.name.as_str()).collect();
+        (self.findings.pitch.is_none() && !names.is_empty()).then(|| {
+            let names = names.join(", ");
+            format!("design rules were not checked, as the stack states no resolution: {names}")
+        })
     }
 
     /// Returns the line about a feature, without the name of its kind.

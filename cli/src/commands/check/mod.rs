@@ -307,7 +307,7 @@ fn printed(name: &str, found: &Found, all: bool) -> String {
         accepted => format!(", {accepted} accepted"),
     };
     let mut text = format!("{}: {layers}, {count}{specks}{accepted}\n", printable(name));
-    if let Some(note) = found.whole_build() {
+    for note in found.whole_build().into_iter().chain(found.unchecked_rules()) {
         text += &format!("  note: {note}\n");
     }
     let name_of = |feature: &Feature| found.records[feature.finding].name();
