@@ -8,6 +8,8 @@ use super::narrow::Narrow;
 /// The least height of a narrow feature, as a share of its rule's limit: a wedge of 60 degrees is lower
 /// where it is narrower, as where slopes begin and end.
 const LEAST_HEIGHT: f64 = 0.75;
+/// The fewest layers of a narrow feature: of thick layers, one or two are such a wedge.
+const LEAST_LAYERS: u32 = 3;
 
 /// A narrow place of a layer, and the rule that it breaks.
 #[derive(Clone, Debug)]
@@ -98,9 +100,12 @@ impl Narrows {
     /// Lists a feature, unless it is the low edge of something wider.
     fn end(&mut self, growing: Growing) {
         let [first, last] = growing.feature.layers;
+        let layers = last - first + 1;
         let is_high = match growing.height_um.zip(self.pixel_um) {
-            Some((height_um, pixel_um)) => height_um > LEAST_HEIGHT * growing.limit * pixel_um,
-            None => last - first + 1 >= self.least_layers,
+            Some((height_um, pixel_um)) => {
+                layers >= LEAST_LAYERS && height_um > LEAST_HEIGHT * growing.limit * pixel_um
+            }
+            None => layers >= self.least_layers,
         };
         if is_high {
             self.ended.push(growing.feature);
