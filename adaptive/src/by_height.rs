@@ -155,7 +155,7 @@ impl<T> ByHeight<T> {
 
     /// Returns the heights of a part, given its ends in micrometers, for which there is no value.
     pub(crate) fn missing(&self, [bottom_um, top_um]: [f64; 2]) -> Option<[Length; 2]> {
-        let [bottom, top] = [bottom_um, top_um].map(Length::from_um);
+        let [bottom, top] = [bottom_um, top_um].map(|um| Length::from_um(um).to_whole_nm());
         let (first, last) = (self.ranges[0].from, self.ranges[self.ranges.len() - 1].to);
         let is_beyond = |a: Length, b: Length| a.um() > b.um() + ROUNDING_UM;
         if let Some(first) = first.filter(|first| is_beyond(*first, bottom)) {

@@ -336,8 +336,16 @@ impl Found {
         Some(format!("each copy and the build mesh were checked as they stand: {why}"))
     }
 
-    /// Returns why some design rules were not checked, if there are any.
+    /// Returns why design rules were not checked, in all layers or in some.
     pub fn unchecked_rules(&self) -> Option<String> {
+        let textures = self.findings.layers.iter().filter(|layer| layer.is_texture).count();
+        if textures > 0 {
+            let layers = if textures == 1 { "layer" } else { "layers" };
+            return Some(format!(
+                "design rules were not checked in {textures} {layers} with thousands of narrow places, \
+                 as dots are"
+            ));
+        }
         let needs_length = |rule: &&WidthRule| matches!(rule.least, LeastWidth::Length(_));
         let rules = self.findings.widths.iter().filter(needs_length);
         let names: Vec<&str> = rules.map(|rule| rule.name.as_str()).collect();

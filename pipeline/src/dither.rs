@@ -52,8 +52,8 @@ impl DitherSettings {
     /// parts get cells inside.
     ///
     /// # Errors
-    /// Returns an error if the settings of cells contradict each other. The layers' errors are those of
-    /// reading and dithering them, and of layers with cells that do not state their place.
+    /// Returns an error if the settings of cells contradict each other. Layers fail that cannot be
+    /// read or dithered, and layers with cells that do not state their place.
     pub fn layers<'a, E: From<DitherError> + From<StackError> + From<Error> + Send + 'a>(
         &self,
         layers: impl Iterator<Item = Result<PassingLayer, E>> + 'a,
@@ -92,7 +92,8 @@ impl DitherSettings {
             (Some(cell), Some(clearance)) => (cell, clearance),
             (None, None) if is_half(&self.cell_level) => return Ok(None),
             _ => {
-                let sentence = "--cell needs --cell-clearance: how near to a surface may cells be?";
+                let sentence =
+                    "--cell needs --cell-clearance, the least distance between cells and surfaces";
                 return Err(Error::settings(sentence));
             }
         };
@@ -122,6 +123,14 @@ fn with_cells<E: From<StackError> + From<Error> + Send>(
     map_in_order(placed.map(|layer| layer.map_err(|Failure(error)| error)), move |surrounded| {
         let inside = surrounded.inside(clearance);
         let (mut layer, pitch) = (surrounded.layer, surrounded.pitch);
+        // Narrower ones would be single pixels, which may cure evenly.
+        if screen.cell.um() < 2.0 * pitch.long_side().um() {
+            return Err(E::from(Error::settings(format!(
+                "--cell {}: cells are at least two pixels wide, and a pixel of this stack has {} um",
+                screen.cell,
+                short(pitch.long_side())
+            ))));
+        }
         if inside.change_count() > 0 {
             layer.image = screen.screened(&layer.image, &inside, pitch, layer.info.index).into();
             layer.info.set_record(&DitherRecord(format!("cells of {}", screen.cell)));

@@ -222,7 +222,7 @@ mod tests {
         }
     }
 
-    /// A layer whose pixels are white but for a few.
+    /// A layer that is white, with a few black pixels.
     fn layer(index: u32, z_um: f64, thickness_um: f64, black: &[(u32, u32)]) -> Layer {
         let pixels: Vec<bool> =
             (0..SIDE * SIDE).map(|at| !black.contains(&(at % SIDE, at / SIDE))).collect();

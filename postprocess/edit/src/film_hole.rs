@@ -171,7 +171,10 @@ impl FilmHole {
         if diffuser > 0.0 {
             let corner = self.corner.map_or(round, Length::mm);
             sections.push(section(before + length, diffuser, corner));
-            sections.push(section(before + length + after, diffuser + after, corner));
+            // A hole square to the surface ends there.
+            if after > 0.0 {
+                sections.push(section(before + length + after, diffuser + after, corner));
+            }
         }
         let path = path.iter().map(|point| point.map(Length::from_mm)).collect();
         let loft = LoftShape { path, bend, across: Some(span), sections };

@@ -451,6 +451,22 @@ fn a_diffuser_widens_by_its_angles() {
 }
 
 #[test]
+fn a_diffuser_square_to_the_surface_ends_there() {
+    let keys = "diameter = \"1mm\"\nangle = 90\nlength_ratio = 6\nmetering_ratio = 2\n\
+                lateral_angle = 14\nforward_angle = 15\ncorner = \"0.2mm\"";
+    let masks = FINE.drawn(&film_hole(keys)).unwrap();
+    let [lateral, forward] = [14f64, 15.0].map(|angle| angle.to_radians().tan());
+    let cut = |at: f64| {
+        let half = [0.5 + at * lateral, 0.5 + at * forward / 2.0];
+        Cut { at, half, corner: 0.5 - 0.3 * at / 4.0, shift: [0.0; 2] }.area()
+    };
+    // The layer of the surface has its middle on the end: half of it is left out.
+    let volume = PI / 4.0 * 2.0 + simpson(0.0, 4.0, cut) - 0.01 * cut(4.0);
+    assert_near(FINE.volume_mm3(&masks), volume, 2e-3);
+    assert_eq!(masks[SURFACE + 1].white_pixels(), 0);
+}
+
+#[test]
 fn a_curved_diffuser_turns_to_its_exit() {
     let keys = "diameter = \"1mm\"\nangle = 60\nexit_angle = 30\nlength_ratio = 7\nmetering_ratio = 3\n\
                 lateral_angle = 10\nforward_angle = 8";

@@ -274,6 +274,8 @@ pub struct LayerFacts {
     pub has_white: bool,
     /// Whether it has white at the image's border.
     pub white_at_border: bool,
+    /// Whether it has too many narrow places to be judged by rules of widths, as dots have.
+    pub is_texture: bool,
 }
 
 /// A list that ends where memory would grow without bound.
@@ -357,6 +359,7 @@ impl LayerFacts {
             stray_rows: info.stray_rows.len() as u32,
             has_white: false,
             white_at_border: false,
+            is_texture: false,
         }
     }
 }

@@ -389,6 +389,8 @@ impl LabeledLayer {
         facts.has_white = labelled.of_colour(true).next().is_some();
         facts.white_at_border = labelled.of_colour(true).any(|white| labelled.reaches_frame(white));
         let breaches = breaches(&labelled, pitch, options);
+        facts.is_texture = breaches.is_none();
+        let breaches = breaches.unwrap_or_default();
         Self { facts, name: info.name(), pitch, origin_mm: info.origin_mm, labelled, breaches }
     }
 
@@ -400,17 +402,18 @@ impl LabeledLayer {
 /// The least difference from a limit in widths of a pixel: less is rounding.
 const LESS: f64 = 0.5;
 
-/// Returns the places of a layer that break rules of widths, each with the rule of the least width.
-fn breaches(layer: &Labelled, pitch: Option<Pitch>, options: &CheckOptions) -> Vec<Breach> {
+/// Returns the places of a layer that break rules of widths, each with the rule of the least width;
+/// `None` of a texture.
+fn breaches(layer: &Labelled, pitch: Option<Pitch>, options: &CheckOptions) -> Option<Vec<Breach>> {
     if options.islands_only {
-        return Vec::new();
+        return Some(Vec::new());
     }
     let of_rule = |rule: &WidthRule| rule.least.widths(pitch);
     let limits = [true, false].map(|is_white| {
         let rules = options.widths.iter().filter(|rule| rule.is_of_white == is_white);
         rules.filter_map(of_rule).reduce(f64::max)
     });
-    let places = narrow(layer, limits, Metric::of(pitch));
+    let places = narrow(layer, limits, Metric::of(pitch))?;
     let breach = |place: narrow::Narrow| {
         let rules = options.widths.iter().enumerate();
         let (limit, rule) = rules
@@ -420,7 +423,7 @@ fn breaches(layer: &Labelled, pitch: Option<Pitch>, options: &CheckOptions) -> V
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(Breach { place, rule, limit })
     };
-    places.into_iter().filter_map(breach).collect()
+    Some(places.into_iter().filter_map(breach).collect())
 }
 
 /// The state of a check after the layers so far.

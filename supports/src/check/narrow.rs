@@ -43,6 +43,12 @@ const LEAST_TIP: f64 = 1.55;
 /// nearer than a radius to the end is not judged.
 const AROUND: f64 = 3.2;
 
+/// The most rectangles of a color in which discs are tried. Dots have more, and each is narrow by design.
+const MOST_WINDOWS: usize = 2_000;
+
+/// The most chords of a layer, which a texture of single pixels has.
+const MOST_CHORDS: usize = 2_000_000;
+
 /// The least side of the square that a place holds, in pixels.
 const LEAST_SIDE: u32 = 2;
 
@@ -62,18 +68,25 @@ pub(super) struct Narrow {
 }
 
 /// Returns the places of a color that are narrower than a limit, given in widths of a pixel, by their
-/// first pixels. Black beyond the image is wide.
-pub(super) fn narrow(layer: &Labelled, limits: [Option<f64>; 2], metric: Metric) -> Vec<Narrow> {
-    let Some(most) = limits.into_iter().flatten().reduce(f64::max) else { return Vec::new() };
-    let chords = chords(&layer.mask, metric.pixels(CHORD * most));
+/// first pixels. Black beyond the image is wide. Returns `None` if there are too many, as in a texture.
+pub(super) fn narrow(
+    layer: &Labelled,
+    limits: [Option<f64>; 2],
+    metric: Metric,
+) -> Option<Vec<Narrow>> {
     let mut found = Vec::new();
+    let Some(most) = limits.into_iter().flatten().reduce(f64::max) else { return Some(found) };
+    let chords = chords(&layer.mask, metric.pixels(CHORD * most));
+    if chords.len() > MOST_CHORDS {
+        return None;
+    }
     for (is_white, limit) in [true, false].into_iter().zip(limits) {
         let Some(limit) = limit else { continue };
-        for window in windows(layer, &chords, is_white, limit, metric) {
+        for window in windows(layer, &chords, is_white, limit, metric)? {
             in_window(&layer.mask, is_white, &window, limit, metric, &mut found);
         }
     }
-    found
+    Some(found)
 }
 
 /// A run of a color along a row, or runs of equal extent along columns side by side.
@@ -175,14 +188,14 @@ fn end(
 }
 
 /// Returns the rectangles in which discs are to be tried: around chords that follow each other over
-/// some lines, and around small components. They are apart.
+/// some lines, and around small components. They are apart. Returns `None` if there are too many.
 fn windows(
     layer: &Labelled,
     chords: &[Chord],
     is_white: bool,
     limit: f64,
     metric: Metric,
-) -> Vec<Region> {
+) -> Option<Vec<Region>> {
     let mut windows = Vec::new();
     let radius = metric.pixels(limit / 2.0);
     for (is_upright, radius) in [(true, radius[0]), (false, radius[1])] {
@@ -202,7 +215,7 @@ fn windows(
             windows.push(Region { columns: columns.clone(), rows: rows.clone() });
         }
     }
-    apart(windows, around(limit, metric))
+    (windows.len() <= MOST_WINDOWS).then(|| apart(windows, around(limit, metric)))
 }
 
 /// Returns the columns and rows around chords in which discs are tried.
@@ -579,6 +592,16 @@ mod tests {
         mask.finish()
     }
 
+    #[test]
+    fn dots_are_no_narrow_places() {
+        // Bars three pixels wide, 13 apart, of 12 rows: fewer than dots, and then more.
+        let bars =
+            |side: u32| Labelled::new(drawn(side, |[x, y]| x % 13.0 < 3.0 && y % 13.0 < 12.0));
+        let found = |side| narrow(&bars(side), [Some(8.0), None], Metric::of(None));
+        assert!(found(130).is_some_and(|places| places.len() == 100));
+        assert_eq!(found(650), None);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
 
@@ -636,7 +659,7 @@ mod tests {
             });
             let metric = Metric::of(None);
             let layer = Labelled::new(mask.clone());
-            let mut found = narrow(&layer, [Some(limit), None], metric);
+            let mut found = narrow(&layer, [Some(limit), None], metric).unwrap();
             let whole = Region { columns: 0..200, rows: 0..200 };
             let mut all = Vec::new();
             in_window(&mask, true, &whole, limit, metric, &mut all);
