@@ -47,7 +47,7 @@ pub struct SupportSettings {
     pub radius: Length,
     /// Section of supports to the part.
     #[serde(with = "text", skip_serializing_if = "is_round")]
-    pub section: StrutSection,
+    pub strut_section: StrutSection,
     /// Thickness of a streamlined section, as a share of its chord.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub thickness_ratio: Option<f64>,
@@ -100,7 +100,7 @@ impl Default for SupportSettings {
             base: options.pillar.base,
             clearance: options.pillar.clearance,
             radius: options.radius,
-            section: StrutSection::Round,
+            strut_section: StrutSection::Round,
             thickness_ratio: None,
             flow: None,
             max_tilt: Degrees(options.max_tilt),
@@ -158,14 +158,14 @@ impl SupportSettings {
 
     /// Returns the section of streamlined supports.
     fn flow_section(&self) -> Option<FlowSection> {
-        if self.section == StrutSection::Round {
+        if self.strut_section == StrutSection::Round {
             return None;
         }
         let (sin, cos) = self.flow.map_or(0.0, |flow| flow.0).to_radians().sin_cos();
         // Nine digits are short in plans, and make quarter turns exact; zero has no sign.
         let [cos, sin] = [cos, sin].map(|part| (part * 1e9).round() / 1e9 + 0.0);
         let thickness_ratio = self.thickness_ratio.unwrap_or(THICKNESS_RATIO);
-        Some(FlowSection { section: self.section, thickness_ratio, flow: [cos, sin, 0.0] })
+        Some(FlowSection { section: self.strut_section, thickness_ratio, flow: [cos, sin, 0.0] })
     }
 
     /// Returns the names of surfaces to avoid.
@@ -269,8 +269,8 @@ mod tests {
     fn flows_have_directions() {
         let flow = |angle: &str| {
             let flow = Some(angle.parse().unwrap());
-            let section = StrutSection::Ellipse;
-            let settings = SupportSettings { section, flow, ..SupportSettings::default() };
+            let strut_section = StrutSection::Ellipse;
+            let settings = SupportSettings { strut_section, flow, ..SupportSettings::default() };
             settings.options().section.unwrap().flow
         };
         assert_eq!(flow("90deg"), [0.0, 1.0, 0.0]);

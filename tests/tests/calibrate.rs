@@ -504,13 +504,14 @@ fn laws_over_an_ingredient_make_materials_between() {
     outside.is_refused_with(&["laws.toml", "measured with 0 to 0.25 g", "not with 0.3"]);
     let none = scratch.run("lamp material make laws.toml --photoinitiator 5");
     none.is_refused_with(&["no [[law]] over photoinitiator"]);
-    let best = "lamp material make laws.toml --best bd --thickness 100um --overcure 3 -o best.toml";
+    let best =
+        "lamp material make laws.toml --objective bd --thickness 100um --overcure 3 -o best.toml";
     let best = scratch.run(best).succeeds();
     // B_d falls over the absorber (002 figure 89): without any it is ln(80/40)/0.0016, 433 um, and
     // 300 um take 40 exp(0.48) mJ/cm2.
     assert!(best.stderr.contains("0 g per 100 g of monomer of uv-absorber: 6"), "{best:?}");
     assert!(best.stderr.contains("cures 300.0 um, and edges grow by 0 um"), "{best:?}");
-    scratch.run("lamp material make laws.toml --best bd").is_wrong_usage(&["--thickness"]);
+    scratch.run("lamp material make laws.toml --objective bd").is_wrong_usage(&["--thickness"]);
     // Both ingredients at once tell no law (002 section 3.4.8 d).
     let both = absorber().replacen("0,6,150", "0,5,150", 1);
     scratch.write("both.csv", both.as_bytes());

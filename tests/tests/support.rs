@@ -248,7 +248,7 @@ fn streamlined_supports_lie_along_the_flow_and_join_the_part() {
         * 0.4
         * (0.2969 * 2.0 / 3.0 - 0.1260 / 2.0 - 0.3516 / 3.0 + 0.2843 / 4.0 - 0.1036 / 5.0);
     for (section, share) in [("ellipse", 0.1 * std::f64::consts::PI), ("aerofoil", aerofoil)] {
-        scratch.run(&format!("{line} --section {section} --flow 90deg")).succeeds();
+        scratch.run(&format!("{line} --strut-section {section} --flow 90deg")).succeeds();
         assert!(islands(&scratch, "held.tif").is_empty());
         let plan = String::from_utf8(scratch.bytes("plan.toml")).unwrap();
         assert!(
@@ -291,12 +291,12 @@ fn streamlined_supports_lie_along_the_flow_and_join_the_part() {
         }
     }
     for (words, said) in [
-        ("--flow 90deg", "--section"),
-        ("--thickness-ratio 30%", "--section"),
-        ("--section ellipse --to platform", "round"),
-        ("--section ellipse --thickness-ratio 2%", "too thin"),
-        ("--section oval", "aerofoil"),
-        ("--section ellipse --flow north", "90deg"),
+        ("--flow 90deg", "--strut-section"),
+        ("--thickness-ratio 30%", "--strut-section"),
+        ("--strut-section ellipse --to platform", "round"),
+        ("--strut-section ellipse --thickness-ratio 2%", "too thin"),
+        ("--strut-section oval", "aerofoil"),
+        ("--strut-section ellipse --flow north", "90deg"),
     ] {
         scratch.run(&format!("{line} {words}")).is_wrong_usage(&[said]);
     }

@@ -250,7 +250,7 @@ pub(crate) struct SupportStageArgs {
         "An ellipse, its long axis along --flow",
         "A symmetric aerofoil, its leading edge upstream",
     ]))]
-    section: StrutSection,
+    strut_section: StrutSection,
 
     /// Direction of the flow past the supports: its angle from x, counterclockwise from above [default:
     /// 0deg, along x]
@@ -396,7 +396,7 @@ impl From<SupportStageArgs> for SupportSettings {
             base: args.base,
             clearance: args.clearance,
             radius: args.radius,
-            section: args.section,
+            strut_section: args.strut_section,
             thickness_ratio: args.thickness_ratio,
             flow: args.flow,
             max_tilt: args.max_tilt,

@@ -71,12 +71,14 @@ pub struct Material {
     pub two_depth: Option<TwoDepthNumbers>,
     /// How deep full white cures, in layers: 1 cures just the layer, more bonds it to the one below (002
     /// section 3.4.1). Commands take it where they are not given another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub overcure: Option<GivenNumber>,
     /// The cure width of features of several sizes (002 section 3.4.4).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cure_width: Vec<WidthNumbers>,
     /// The share of the doses of the layers above that counts for the cure width, in parts of many layers
     /// (002 section 3.4.8 a).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub many_layers: Option<GivenNumber>,
     /// How its numbers follow its composition (002 sections 3.4.6 and 3.4.7), and its cure width the
     /// lamp (section 3.4.5).

@@ -14,7 +14,7 @@ fn too_little_memory_is_one_sentence_and_no_file() {
         // the system cannot load a program of the development profile.
         let limits = trials(8).min(100);
         for step in 0..limits {
-            let mebibytes = 56 + 344 * step * step / (limits * limits);
+            let mebibytes = 64 + 336 * step * step / (limits * limits);
             let line = format!("{} --threads 4", job.line);
             let what = format!("`{line}` with {mebibytes} MiB");
             let ended =

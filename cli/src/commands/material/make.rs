@@ -22,14 +22,14 @@ use crate::terminal::progress::Progress;
 /// before you build.
 ///
 /// With --uv-absorber or --photoinitiator, the numbers are interpolated by the laws of a material
-/// that lamp calibrate composition wrote, within the amounts that were measured. --best bd finds the
+/// that lamp calibrate composition wrote, within the amounts that were measured. --objective bd finds the
 /// amount whose edges grow least by the dose that bonds layers.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp material make composition.toml -o mine.toml
   lamp material make measured.toml --uv-absorber 0.1 -o mine.toml
-  lamp material make measured.toml --best bd --thickness 100um --overcure 3 -o mine.toml")]
+  lamp material make measured.toml --objective bd --thickness 100um --overcure 3 -o mine.toml")]
 pub(super) struct MakeArgs {
     /// Composition, or material with laws: a TOML file, or - for standard input
     composition: PathBuf,
@@ -43,7 +43,8 @@ pub(super) struct MakeArgs {
     photoinitiator: Option<f64>,
 
     /// Search the amounts that the material's laws cover
-    #[arg(long, value_name = "AIM", requires = "thickness", requires = "overcure")]
+    #[arg(long = "objective", alias = "best", value_name = "OBJECTIVE")]
+    #[arg(requires = "thickness", requires = "overcure")]
     best: Option<Aim>,
 
     /// Thickness of the layers to bond
@@ -94,7 +95,7 @@ pub(super) fn run(args: &MakeArgs, common: &Common) -> Result<(), Exit> {
             made.overcure = Some(GivenNumber {
                 value: overcure,
                 plus_minus: None,
-                source: format!("lamp material make --best bd, for layers of {thickness}"),
+                source: format!("lamp material make --objective bd, for layers of {thickness}"),
             });
             let mut says = left_out(&measured, best.over);
             says.push(bonds(&best, depth));

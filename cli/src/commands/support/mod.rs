@@ -231,15 +231,15 @@ impl SupportArgs {
                 "--spacing {spacing}: supports are {wide} wide, so they would touch: write at least that"
             )));
         }
-        let SupportSettings { section, thickness_ratio, flow, .. } = &*self.settings;
-        if *section == StrutSection::Round && (thickness_ratio.is_some() || flow.is_some()) {
+        let SupportSettings { strut_section, thickness_ratio, flow, .. } = &*self.settings;
+        if *strut_section == StrutSection::Round && (thickness_ratio.is_some() || flow.is_some()) {
             return Err(Exit::usage(
-                "--flow and --thickness-ratio are of --section ellipse or aerofoil: write one of them",
+                "--flow and --thickness-ratio are of --strut-section ellipse or aerofoil: write one of them",
             ));
         }
-        if *section != StrutSection::Round && to == SupportFoot::Platform {
+        if *strut_section != StrutSection::Round && to == SupportFoot::Platform {
             return Err(Exit::usage(
-                "--section is of supports to the part: pillars are round, as they are cut off",
+                "--strut-section is of supports to the part: pillars are round, as they are cut off",
             ));
         }
         check_not_input(&self.output.output, paths(&self.part))?;
