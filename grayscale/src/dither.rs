@@ -1,7 +1,8 @@
 //! The dithering stage: gray layers to dots.
 
 use lamp_stack::{
-    DitherRecord, GrayMask, Image, Layer, MAX_RUNS, Mask, PassingLayer, StackError, map_in_order,
+    CellsRecord, DitherRecord, GrayMask, Image, Layer, MAX_RUNS, Mask, PassingLayer, StackError,
+    map_in_order,
 };
 use thiserror::Error;
 
@@ -69,7 +70,13 @@ pub fn dither<E: From<DitherError> + From<StackError> + Send>(
 fn dither_layer(mut layer: Layer, method: DitherMethod) -> Result<Layer, DitherError> {
     if let Image::Gray(gray) = &*layer.image {
         layer.image = dither_image(gray, method, layer.info.index)?.into();
-        layer.info.set_record(&DitherRecord(method.name().to_owned()));
+        let method = method.name().to_owned();
+        layer.info.renew_record(|before| match before {
+            Some(DitherRecord::Cells(cells)) => {
+                DitherRecord::Cells(CellsRecord { method: Some(method), ..cells })
+            }
+            _ => DitherRecord::Dots(method),
+        });
     }
     Ok(layer)
 }

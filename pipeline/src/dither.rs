@@ -3,7 +3,9 @@
 use lamp_grayscale::{
     CoarseScreen, DitherError, DitherMethod, EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity,
 };
-use lamp_stack::{DitherRecord, Length, PassingLayer, Pitch, StackError, map_in_order};
+use lamp_stack::{
+    CellsRecord, DitherRecord, Length, PassingLayer, Pitch, StackError, map_in_order,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
@@ -133,7 +135,12 @@ fn with_cells<E: From<StackError> + From<Error> + Send>(
         }
         if inside.change_count() > 0 {
             layer.image = screen.screened(&layer.image, &inside, pitch, layer.info.index).into();
-            layer.info.set_record(&DitherRecord(format!("cells of {}", screen.cell)));
+            layer.info.set_record(&DitherRecord::Cells(CellsRecord {
+                method: None,
+                cell_um: screen.cell.um(),
+                cell_level: f64::from(screen.level) / 255.0,
+                cell_clearance_um: clearance.um(),
+            }));
         }
         Ok(layer.into())
     })

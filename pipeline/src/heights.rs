@@ -166,6 +166,17 @@ impl HeightSettings {
             let why = "--ra-line needs a bound of roughness, such as --ra 6um, or --criterion ra";
             return Err(Error::settings(why));
         }
+        if let (Some(line), Some(bounds)) = (self.ra_line, &self.ra)
+            && let [least, _] = bounds.map(|bound| bound.um()).least_and_most()
+            && least <= line.upright.um()
+        {
+            let least = Length::from_um(least);
+            let why = format!(
+                "--ra {least} is out of reach: by --ra-line, an upright wall has {}",
+                line.upright
+            );
+            return Err(Error::settings(why));
+        }
         Ok(criterion)
     }
 

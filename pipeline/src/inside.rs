@@ -209,6 +209,7 @@ fn both(a: &Mask, b: &Mask) -> Arc<Mask> {
 
 #[cfg(test)]
 mod tests {
+    use lamp_fixtures::drawn_mask;
     use lamp_stack::PageInfo;
     use proptest::prelude::*;
 
@@ -224,26 +225,14 @@ mod tests {
 
     /// A layer that is white, with a few black pixels.
     fn layer(index: u32, z_um: f64, thickness_um: f64, black: &[(u32, u32)]) -> Layer {
-        let pixels: Vec<bool> =
-            (0..SIDE * SIDE).map(|at| !black.contains(&(at % SIDE, at / SIDE))).collect();
-        let (mut offsets, mut transitions) = (vec![0], Vec::new());
-        for row in pixels.chunks(SIDE as usize) {
-            let mut before = false;
-            for (column, &white) in (0..).zip(row) {
-                if white != before {
-                    transitions.push(column);
-                }
-                before = white;
-            }
-            offsets.push(transitions.len() as u32);
-        }
+        let is_white = |[x, y]: [f64; 2]| !black.contains(&(x as u32, y as u32));
         let info = PageInfo {
             index,
             z_um: Some(z_um),
             thickness_um: Some(thickness_um),
             ..PageInfo::default()
         };
-        let image = Mask::new(SIDE, offsets, transitions).unwrap().into();
+        let image = drawn_mask([SIDE; 2], is_white).into();
         Layer { info, pitch: Some("100x150um".parse().unwrap()), image }
     }
 

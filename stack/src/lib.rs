@@ -108,8 +108,8 @@ pub use plain_text::PlainText;
 pub use printer::fault::PrinterFault;
 pub use printer::write::{PrinterFormat, write_printer_file};
 pub use record::{
-    BuildRecord, BuiltPart, BuiltParts, CompensateRecord, DitherRecord, FieldRecord, FixRecord,
-    FixedBand, PageRecord, PrintRecord, PrintStep, SliceRecord, StripRecord,
+    BuildRecord, BuiltPart, BuiltParts, CellsRecord, CompensateRecord, DitherRecord, FieldRecord,
+    FixRecord, FixedBand, PageRecord, PrintRecord, PrintStep, SliceRecord, StripRecord,
 };
 pub use shell::{file_word, quoted, words};
 pub use significant::{format_significant, round_significant, to_nm};

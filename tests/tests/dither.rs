@@ -92,3 +92,53 @@ fn pixels_too_wide_to_cure_evenly_are_told_of_once() {
         scratch.run("dither gray.tif --quiet -o dots.tif").succeeds_quietly();
     }
 }
+
+/// Cells lie inside a ball: a pixel that changes is as far from its surface as the clearance.
+#[test]
+fn cells_screen_the_inside_of_a_part() {
+    let scratch = Scratch::new();
+    scratch.mesh("ball.stl", &lamp_fixtures::sphere(5.0, 20_000));
+    scratch.run("slice ball.stl --dpi 300 --thickness 200um -q -o ball.tif").succeeds_quietly();
+    let line = "dither ball.tif --cell 340um --cell-clearance 1mm";
+    scratch.run(&format!("{line} -o cells.tif")).succeeds_quietly();
+    let (before, after) = (scratch.layers("ball.tif"), scratch.layers("cells.tif"));
+    let (mut inner, mut black) = (0, 0);
+    let pairs = before.iter().zip(&after).zip(masks(&before).into_iter().zip(masks(&after)));
+    for ((layer, screened), (from, to)) in pairs {
+        let [left, top] = layer.info.origin_mm.unwrap();
+        let away_mm = layer.info.z().unwrap().mm() + 0.1 - 5.0;
+        for row in 0..from.height() {
+            for column in 0..from.width() {
+                let [x, y] = [column, row].map(|at| (f64::from(at) + 0.5) * 25.4 / 300.0);
+                let off = (left + x).hypot(top - y).hypot(away_mm);
+                let is_black = from.is_white(column, row) && !to.is_white(column, row);
+                assert!(from.is_white(column, row) || !to.is_white(column, row));
+                assert!(!is_black || off < 4.0, "{off} in layer {}", layer.info.index);
+                // A cylinder of the clearance fits there, with a layer and a pixel to spare.
+                inner += u64::from(off < 3.1);
+                black += u64::from(off < 3.1 && is_black);
+            }
+        }
+        let has_cells = from != to;
+        let record = screened.info.other.get("dither");
+        assert_eq!(record.is_some(), has_cells);
+        assert!(
+            record.is_none_or(|it| it["cell_um"] == 340.0 && it["cell_clearance_um"] == 1000.0)
+        );
+    }
+    let share = black as f64 / inner as f64;
+    assert!((share - 0.5).abs() < 0.03, "{black} of {inner}");
+    for (words, why) in [
+        ("--cell 340um", "--cell-clearance"),
+        ("--cell 17um --cell-clearance 1mm", "cure evenly"),
+        (
+            "--cell 85um --cell-clearance 1mm",
+            "two pixels wide, and a pixel of this stack has 84.7 um",
+        ),
+        ("--cell 340um --cell-clearance 0um", "above zero"),
+        ("--cell 340um --cell-clearance 1mm --layers 3..9", "leave out --layers"),
+    ] {
+        scratch.run(&format!("dither ball.tif {words} -o out.tif")).is_wrong_usage(&[why]);
+        assert!(!scratch.path("out.tif").exists());
+    }
+}

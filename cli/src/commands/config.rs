@@ -1,4 +1,4 @@
-//! `lamp config`: shows where options, machines, materials and projectors come from.
+//! `lamp config`: shows where options and your own machines, materials, projectors and design rules come from.
 
 use std::path::Path;
 
@@ -7,6 +7,7 @@ use lamp_grayscale::material::Material;
 use lamp_machine::Machine;
 use lamp_pipeline::documents::{Document, own_folder, own_names};
 use lamp_planning::projector::Projector;
+use lamp_supports::DesignRules;
 use serde::Serialize;
 
 use crate::Lamp;
@@ -18,10 +19,10 @@ use crate::streams::print;
 use crate::terminal::help::formed;
 use crate::terminal::progress::printable;
 
-/// Show where options, machines, materials and projectors come from
+/// Show where options, machines, materials, projectors and design rules come from
 ///
-/// Without a command, it lists the files of options and what is in them, and the machines, materials
-/// and projectors of your settings folder. With a command, such as slice, it lists the options that
+/// Without a command, it lists the files of options and what is in them, and the machines, materials,
+/// projectors and design rules of your settings folder. With a command, such as slice, it lists the options that
 /// the command gets, each with its file.
 #[derive(Args)]
 #[command(after_help = "\
@@ -97,7 +98,7 @@ struct CommandOption<'a> {
     file: &'a str,
 }
 
-/// Where options, machines, materials and projectors come from, by `lamp config --json`.
+/// Where options, machines, materials, projectors and design rules come from, by `lamp config --json`.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct ConfigAnswer {
@@ -109,6 +110,8 @@ pub(crate) struct ConfigAnswer {
     materials: OwnDocuments,
     /// Your own projectors.
     projectors: OwnDocuments,
+    /// Your own design rules.
+    rules: OwnDocuments,
 }
 
 /// A file of options.
@@ -185,6 +188,7 @@ impl ConfigAnswer {
             machines: OwnDocuments::found::<Machine>(),
             materials: OwnDocuments::found::<Material>(),
             projectors: OwnDocuments::found::<Projector>(),
+            rules: OwnDocuments::found::<DesignRules>(),
         };
         (found, first_fault)
     }
@@ -204,7 +208,7 @@ impl ConfigAnswer {
             }
         }
         for OwnDocuments { kind, folder, names } in
-            [&self.machines, &self.materials, &self.projectors]
+            [&self.machines, &self.materials, &self.projectors, &self.rules]
         {
             let place = folder.as_deref().unwrap_or("no home folder is known");
             let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };

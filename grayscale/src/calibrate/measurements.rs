@@ -291,7 +291,7 @@ pub fn width_points(
 }
 
 /// Reads cure depths and cure widths from a table of `uv_absorber_g_per_100g` and
-/// `photoinitiator_g_per_100g`, of which one changes from row to row and the other may be missing;
+/// `photoinitiator_g_per_100g`: one changes from row to row, and the other may be missing;
 /// `dose_mj_per_cm2` or, under a light, `exposure_ms`; and for each row either `depth_um`, or
 /// `cured_um` or `width_um` with `feature_px` or `feature_um`, as [`depth_points`] and
 /// [`width_points`] read them. With `by_lamp`, `lamp_mw_per_cm2` takes the place of the ingredients,

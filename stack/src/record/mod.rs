@@ -5,7 +5,7 @@
 //! use lamp_stack::{DitherRecord, PageInfo};
 //!
 //! let mut page = PageInfo::default();
-//! page.set_record(&DitherRecord("blue-noise".to_owned()));
+//! page.set_record(&DitherRecord::Dots("blue-noise".to_owned()));
 //! assert_eq!(page.other["dither"], "blue-noise");
 //! assert!(page.has_record::<DitherRecord>());
 //! ```
@@ -24,7 +24,7 @@ use serde_json::Value;
 
 pub use build::{BuildRecord, BuiltPart, BuiltParts};
 pub use compensate::CompensateRecord;
-pub use dither::DitherRecord;
+pub use dither::{CellsRecord, DitherRecord};
 pub use fix::{FixRecord, FixedBand};
 pub use print::{PrintRecord, PrintStep};
 pub use slice::SliceRecord;

@@ -399,8 +399,9 @@ impl LabeledLayer {
     }
 }
 
-/// The least difference from a limit in widths of a pixel: less is rounding.
-const LESS: f64 = 0.5;
+/// The least difference from a limit in widths of a pixel: pixels that fit in are up to two less than
+/// drawn, at an angle and across a pin.
+const LESS: f64 = 2.0;
 
 /// Returns the places of a layer that break rules of widths, each with the rule of the least width;
 /// `None` of a texture.

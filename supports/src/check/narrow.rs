@@ -571,32 +571,17 @@ fn aside(row: &[u32], width: u32, column: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use lamp_fixtures::drawn_mask;
     use proptest::prelude::*;
 
     use super::*;
 
-    /// Draws an image by the middles of its pixels.
-    fn drawn(side: u32, is_white: impl Fn([f64; 2]) -> bool) -> Mask {
-        let mut mask = MaskBuilder::new(side);
-        for row in 0..side {
-            let (mut transitions, mut last) = (Vec::new(), false);
-            for column in 0..side {
-                let here = is_white([column, row].map(|at| f64::from(at) + 0.5));
-                if here != last {
-                    transitions.push(column);
-                    last = here;
-                }
-            }
-            mask.push_row(&transitions).unwrap();
-        }
-        mask.finish()
-    }
-
     #[test]
     fn dots_are_no_narrow_places() {
         // Bars three pixels wide, 13 apart, of 12 rows: fewer than dots, and then more.
-        let bars =
-            |side: u32| Labelled::new(drawn(side, |[x, y]| x % 13.0 < 3.0 && y % 13.0 < 12.0));
+        let bars = |side: u32| {
+            Labelled::new(drawn_mask([side; 2], |[x, y]| x % 13.0 < 3.0 && y % 13.0 < 12.0))
+        };
         let found = |side| narrow(&bars(side), [Some(8.0), None], Metric::of(None));
         assert!(found(130).is_some_and(|places| places.len() == 100));
         assert_eq!(found(650), None);
@@ -616,7 +601,7 @@ mod tests {
             ],
         ) {
             let at = |[x, y]: [f64; 2]| white[y as usize * 20 + x as usize];
-            let mask = drawn(20, at);
+            let mask = drawn_mask([20; 2], at);
             let metric = Metric::of(Some(dpi.parse().unwrap()));
             for half_row in 0..=40 {
                 for half_column in 0..=40 {
@@ -648,7 +633,7 @@ mod tests {
             round in prop::collection::vec((40.0..160.0f64, 40.0..160.0f64, 3.0..40.0f64), 0..3),
             limit in 8.0..30.0f64,
         ) {
-            let mask = drawn(200, |[x, y]| {
+            let mask = drawn_mask([200; 2], |[x, y]| {
                 let is_bar = |(cx, cy, degrees, width, length): &(f64, f64, f64, f64, f64)| {
                     let (sin, cos) = degrees.to_radians().sin_cos();
                     let [x, y] = [x - cx, y - cy];

@@ -1,26 +1,10 @@
 //! Narrow features of known widths: combs, pins, necks and corners.
 
-use lamp_stack::{Layer, Mask, MaskBuilder, PageInfo, Pitch};
+use lamp_fixtures::drawn_mask as drawn;
+use lamp_stack::{Layer, Mask, PageInfo, Pitch};
 use lamp_supports::{
     CheckError, CheckOptions, Findings, LeastWidth, NarrowFeature, WidthRule, check,
 };
-
-/// Draws an image by the middles of its pixels.
-fn drawn([width, height]: [u32; 2], is_white: impl Fn([f64; 2]) -> bool) -> Mask {
-    let mut mask = MaskBuilder::new(width);
-    for row in 0..height {
-        let (mut transitions, mut last) = (Vec::new(), false);
-        for column in 0..width {
-            let here = is_white([column, row].map(|at| f64::from(at) + 0.5));
-            if here != last {
-                transitions.push(column);
-                last = here;
-            }
-        }
-        mask.push_row(&transitions).unwrap();
-    }
-    mask.finish()
-}
 
 /// Rules of white and of black, in widths of a pixel.
 fn options(limit: f64) -> CheckOptions {
