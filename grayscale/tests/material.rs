@@ -56,6 +56,7 @@ fn what_a_source_does_not_give_is_absent() {
     }
     let error = material("tmpta").resin().unwrap_err();
     assert_eq!(error, ResinError::NoModel("tmpta".to_owned()));
+    assert!(!error.to_string().contains("material make"));
     let mut only_gray_light = material("lamp-suspension");
     (only_gray_light.gray, only_gray_light.working_curve) = (None, None);
     only_gray_light.intensity = None;

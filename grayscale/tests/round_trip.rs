@@ -179,7 +179,9 @@ fn materials() -> impl Strategy<Value = Material> {
             ((curve, gray, gray_light, two_depth, cure_width), kinetics),
             constants,
         )| {
-            let (dimmed, many_layers) = (gray.clone(), gamma.clone());
+            let dimmed = gray.clone();
+            let share = |it: GivenNumber| GivenNumber { value: it.value / (1.0 + it.value), ..it };
+            let many_layers = gamma.clone().map(share);
             let end =
                 |at| LawEnd { at, depth: Some(curve.clone()), width: cure_width.first().cloned() };
             let law = LawNumbers {

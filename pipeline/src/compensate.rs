@@ -145,7 +145,12 @@ impl<'a> Compensating<'a> {
         let moves = uniform.is_some() || material.is_some();
         let again = self.done_before.borrow().lines(name, moves, shrinkage.is_some());
         let doubts = self.by.doubts();
-        again.into_iter().chain(doubts).chain(self.walls.borrow().lines()).collect()
+        again
+            .into_iter()
+            .chain(self.by.counted_above())
+            .chain(doubts)
+            .chain(self.walls.borrow().lines())
+            .collect()
     }
 
     /// Returns walls and losses so far, and the number of layers.
@@ -261,6 +266,12 @@ impl EdgeMove {
             return Ok(Self::Spread(Box::new(BySpread { light, material, dose, lamp_doubt })));
         }
         let widths = widths.ok_or_else(|| {
+            if material.has_composition_laws() {
+                return Error::work(format!(
+                    "{name} has laws over ingredients, and no cure width of one composition: make a \
+                     material of one amount with lamp material make"
+                ));
+            }
             Error::work(format!(
                 "{name} states no cure width: add [[cure-width]] or the critical-dose of [spread] \
                  to its file, or give --uniform"
@@ -283,6 +294,16 @@ impl EdgeMove {
         // The critical dose of depths, which lamp_doubt is on, does not matter to widths.
         let more_doubts = width_doubt.into_iter().chain(of_directions).chain(of_sizes).collect();
         Ok(Self::CureWidth(Box::new(ByCureWidth { widths, material, dose, doses, more_doubts })))
+    }
+
+    /// Returns a sentence on the share of the doses of layers above that counts.
+    fn counted_above(&self) -> Option<String> {
+        let Self::CureWidth(by) = self else { return None };
+        let share = by.material.many_layers.as_ref()?.value;
+        let name = &by.material.name;
+        Some(format!(
+            "by [many-layers] of {name}, a share of {share} of the doses of layers above counts"
+        ))
     }
 
     /// Returns sentences on a lamp and on doses at which the widths were not measured.

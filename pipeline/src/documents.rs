@@ -266,15 +266,25 @@ pub fn is_file<T: Document>(path: &Path) -> bool {
 
 /// Reads a document's file, and its text.
 pub fn read_file<T: Document>(path: &Path) -> Result<(T, String), Error> {
+    let text = text_of::<T>(path)?;
+    let document = T::from_toml(&text);
+    let document =
+        document.map_err(|error| Error::new(ErrorKind::Work, error).at(input_name(path)))?;
+    Ok((document, text))
+}
+
+/// Reads the text of a document's file, or of standard input.
+///
+/// # Errors
+/// Returns an error with the file's name if it cannot be read, is longer than documents are, or is no
+/// text.
+pub fn text_of<T: Document>(path: &Path) -> Result<String, Error> {
     if is_stream(path) && io::stdin().is_terminal() {
         let why = format!("no {} to read: name a file, or pipe one in", T::KIND);
         return Err(Error::settings(why));
     }
-    let read = || -> Result<(T, String), Error> {
-        let text = read_text(path, MAX_FILE, &format!("a {} file", T::KIND))?;
-        Ok((T::from_toml(&text).map_err(|error| Error::new(ErrorKind::Work, error))?, text))
-    };
-    read().map_err(|error| error.at(input_name(path)))
+    let text = read_text(path, MAX_FILE, &format!("a {} file", T::KIND));
+    text.map_err(|error| error.at(input_name(path)))
 }
 
 /// Reads a text of at most `max` bytes. `what` names it in messages.

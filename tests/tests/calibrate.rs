@@ -1,6 +1,6 @@
 //! Checks that `lamp calibrate` recovers the material behind made-up measurements.
 
-use lamp_fixtures::SplitMix;
+use lamp_fixtures::{Sample, SplitMix};
 use lamp_tests::{Scratch, workspace_root};
 use serde_json::Value;
 
@@ -500,6 +500,19 @@ fn laws_over_an_ingredient_make_materials_between() {
         let [value, half] = given(table);
         assert!((value - truth).abs() <= half && half < 0.2 * truth, "{table}: {value} {half}");
     }
+    let many = scratch.run("lamp material make laws.toml -o many.toml");
+    many.is_wrong_usage(&["laws.toml has [[law]] tables: give the amount with --uv-absorber"]);
+    let piped = scratch.run_on("lamp material make -", &scratch.bytes("laws.toml"));
+    piped.is_wrong_usage(&["standard input has [[law]] tables"]);
+    scratch.stack("part.tif", lamp_fixtures::cavity_staircase(1).layers());
+    scratch.part("cube.stl", Sample::Cube, 64);
+    for line in [
+        "slice cube.stl --dpi 100 --material laws.toml -o x.tif",
+        "lamp compensate part.tif --material laws.toml --dose 200mJ/cm2 -o x.tif",
+        "lamp cure part.tif --material laws.toml --section x=0mm -o x.png",
+    ] {
+        scratch.run(line).is_refused_with(&["laws", "make a material of one amount with lamp"]);
+    }
     let outside = scratch.run("lamp material make laws.toml --uv-absorber 0.3");
     outside.is_refused_with(&["laws.toml", "measured with 0 to 0.25 g", "not with 0.3"]);
     let none = scratch.run("lamp material make laws.toml --photoinitiator 5");
@@ -592,4 +605,23 @@ fn widths_have_directions_and_layers() {
     answers(&scratch, line, &table);
     holds(estimate(&table, "share of doses above (1)", 0), 0.2);
     assert!(text(&scratch, "blocks.toml").contains("[many-layers]\nvalue = 0."));
+    // Without squares of one layer there is no line.
+    let of_many = csv.lines().filter(|line| !line.starts_with("1,"));
+    let of_many: String = of_many.flat_map(|line| [line, "\n"]).collect();
+    scratch.write("many.csv", of_many.as_bytes());
+    let line = "lamp calibrate width many.csv --material lamp-suspension --thickness 100um";
+    scratch.run(line).is_refused_with(&["many.csv", "print squares of one layer too"]);
+    // A check names both, and compensate says what counts.
+    let checked = said(&scratch, "lamp material check two.toml");
+    assert!(checked.contains("(1 size, 8.466667mm, across and along the scan)"), "{checked}");
+    assert!(said(&scratch, "lamp material check blocks.toml").contains(", many-layers 0."));
+    scratch.stack("part.tif", lamp_fixtures::cavity_staircase(1).layers());
+    for (material, counts) in [("blocks", true), ("two", false)] {
+        let line = format!(
+            "lamp compensate part.tif --dose 200mJ/cm2 --min-feature 0um --material {material}.toml -o x.tif"
+        );
+        let ran = scratch.run(&line).succeeds();
+        let share = "of the doses of layers above counts";
+        assert_eq!(ran.stderr.contains(share), counts, "{ran:?}");
+    }
 }

@@ -72,7 +72,6 @@ pub struct LawFit<D> {
     ends: [f64; 4],
     /// Their covariance, times the square of Student's t.
     spread: [[f64; 4]; 4],
-    extent: Option<Extent>,
     sensitivity: PhantomData<D>,
 }
 
@@ -137,15 +136,7 @@ pub fn fit_law<D: LawCurve>(over: LawVariable, points: &[LawPoint]) -> Result<La
             return Err(FitError::Vague { what, value, half, unit });
         }
     }
-    Ok(LawFit {
-        over,
-        values,
-        r2: 1.0 - left / scatter,
-        ends,
-        spread,
-        extent: Extent::of_law(points, D::UNIT == Length::UNIT),
-        sensitivity: PhantomData,
-    })
+    Ok(LawFit { over, values, r2: 1.0 - left / scatter, ends, spread, sensitivity: PhantomData })
 }
 
 impl<D: LawCurve> LawFit<D> {
@@ -219,12 +210,12 @@ impl<D: LawCurve> LawFit<D> {
 }
 
 impl LawFit<Length> {
-    /// Returns the numbers at a value for a material file.
+    /// Returns the numbers at a value for a material file, without a range.
     pub fn numbers(&self, at: f64, source: &str) -> CurveNumbers {
         CurveNumbers {
             critical_dose: self.critical_dose(at).given(source),
             penetration_depth: self.sensitivity(at).given(source),
-            measured: self.extent.map(|extent| extent.measured(source)),
+            measured: None,
         }
     }
 
@@ -247,14 +238,14 @@ impl LawFit<Length> {
 }
 
 impl LawFit<WidthSensitivity> {
-    /// Returns the numbers of squares of a size at a value for a material file.
+    /// Returns the numbers of squares of a size at a value for a material file, without a range.
     pub fn numbers(&self, at: f64, feature_size: Length, source: &str) -> WidthNumbers {
         WidthNumbers {
             feature_size,
             direction: None,
             critical_dose: self.critical_dose(at).given(source),
             sensitivity: self.sensitivity(at).given(source),
-            measured: self.extent.map(|extent| extent.measured(source)),
+            measured: None,
         }
     }
 }
@@ -277,10 +268,22 @@ pub fn law_numbers(
     if from >= to {
         return Err(FitError::TooFewValues { over: table.over, values: 0, needed: LEAST_VALUES });
     }
+    // Points at other values determine the lines, too, but the law does not reach there.
+    let range = |points: &[LawPoint], films| {
+        let within = points.iter().filter(|point| (from..=to).contains(&point.at)).copied();
+        let extent = Extent::of_law(&within.collect::<Vec<_>>(), films);
+        extent.map(|extent| extent.measured(source))
+    };
+    let [of_films, of_squares] = [(&table.films, true), (&table.squares, false)]
+        .map(|(points, is_films)| range(points, is_films));
     let end = |at| LawEnd {
         at,
-        depth: films.map(|fit| fit.numbers(at, source)),
-        width: squares.zip(table.feature_size).map(|(fit, size)| fit.numbers(at, size, source)),
+        depth: films
+            .map(|fit| CurveNumbers { measured: of_films.clone(), ..fit.numbers(at, source) }),
+        width: squares.zip(table.feature_size).map(|(fit, size)| WidthNumbers {
+            measured: of_squares.clone(),
+            ..fit.numbers(at, size, source)
+        }),
     };
     Ok(LawNumbers { over: table.over, held: table.held, least: end(from), most: end(to) })
 }
@@ -432,6 +435,40 @@ mod tests {
 
     fn near(found: f64, wanted: f64) {
         assert!((found - wanted).abs() < 1e-6 * wanted.abs(), "{found} for {wanted}");
+    }
+
+    #[test]
+    fn a_law_states_the_range_of_the_measurements_within_it() {
+        let mut noise = SplitMix(2);
+        let [(depth, width, values), _] = truths();
+        let mut films = depth.points(&values, &FILMS, 0.0, &mut noise, false);
+        // Beyond the squares: more dose than any other film got, and the deepest film.
+        let dose = Dose::from_mj_per_cm2(5000.0);
+        films.push(LawPoint { at: 0.0, dose, measured: Length::from_um(3000.0) });
+        let squares = width.points(&values[1..], &SQUARES, 0.0, &mut noise, true);
+        let table = LawTable {
+            over: depth.over,
+            held: None,
+            films: films.clone(),
+            squares: squares.clone(),
+            feature_size: Some(Length::from_um(8000.0)),
+        };
+        let of_films = fit_law::<Length>(depth.over, &films).unwrap();
+        let of_squares = fit_law::<WidthSensitivity>(width.over, &squares).unwrap();
+        let both = law_numbers(&table, Some(&of_films), Some(&of_squares), "a").unwrap();
+        let alone = law_numbers(&table, Some(&of_films), None, "a").unwrap();
+        let doses = |law: &LawNumbers| {
+            let measured = law.least.depth.as_ref().unwrap().measured.as_ref().unwrap();
+            let deepest = measured.depths.as_ref().unwrap().to;
+            ([measured.doses.from, measured.doses.to].map(Dose::mj_per_cm2), deepest)
+        };
+        let within = films.iter().filter(|film| film.at >= values[1]);
+        let deepest = within.clone().map(|film| film.measured.um()).fold(0.0, f64::max);
+        let least = within.map(|film| film.dose.mj_per_cm2()).fold(f64::INFINITY, f64::min);
+        assert_eq!(both.least.at, values[1]);
+        let (range, depth) = doses(&both);
+        assert_eq!((range, depth.um()), ([least, 1400.0], deepest));
+        assert_eq!((doses(&alone).0[1], doses(&alone).1.um()), (5000.0, 3000.0));
     }
 
     #[test]

@@ -45,7 +45,7 @@ pub struct WidthFit {
 /// allows. Where all squares grew, the intervals equal a straight line's by Fieller's theorem.
 ///
 /// # Errors
-/// Returns an error if there are no points, if a size has fewer than three points or two doses, if
+/// Returns an error if there are no points of one layer, if a size has fewer than three points or two doses, if
 /// its width might not rise with the dose, or rises from no dose above zero or at the highest dose
 /// alone.
 pub fn fit_widths(points: &[WidthPoint]) -> Result<Vec<WidthFit>, FitError> {
@@ -55,6 +55,9 @@ pub fn fit_widths(points: &[WidthPoint]) -> Result<Vec<WidthFit>, FitError> {
         let sizes = a.feature_size.um().total_cmp(&b.feature_size.um());
         sizes.then(of_direction(a).cmp(&of_direction(b)))
     });
+    if sorted.is_empty() && !points.is_empty() {
+        return Err(FitError::NoSingleLayer);
+    }
     if sorted.is_empty() {
         return Err(FitError::TooFew { points: 0, needed: 3 });
     }
@@ -129,7 +132,8 @@ pub struct ManyLayersFit {
 ///
 /// # Errors
 /// Returns an error if squares of many layers have several sizes or a direction, if squares of one
-/// layer and that size give no line, or if there are too few points.
+/// layer and that size give no line, if there are too few points, or if more than the whole doses would
+/// count.
 pub fn fit_many_layers(
     points: &[WidthPoint],
     summed: impl Fn(u32) -> f64,
@@ -198,7 +202,11 @@ pub fn fit_many_layers(
         let what = "the share of the doses of layers above";
         return Err(FitError::Vague { what, value, half, unit: "" }.within(group));
     }
-    let share = [value, value - half, value + half];
+    if value - half > 1.0 {
+        return Err(FitError::LargeShare { value, half }.within(group));
+    }
+    // Errors of measurement alone may lead a little beyond the whole dose.
+    let share = [value.min(1.0), value - half, value + half];
     Ok(Some(ManyLayersFit { share, feature_size, points: measured.len() }))
 }
 
@@ -339,6 +347,24 @@ mod tests {
         let [held] = share_held(fits, |fit| [fit.share[1] <= 0.2 && 0.2 <= fit.share[2]]);
         // 95% +- 3.3% is three standard deviations of 400 trials.
         assert!((held - 0.95).abs() < 0.033, "{held}");
+    }
+
+    #[test]
+    fn the_share_of_doses_above_is_at_most_one() {
+        let mut noise = SplitMix(22);
+        let whole = fit_many_layers(&layers_of(1.0, 0.5, &mut noise), twenty).unwrap().unwrap();
+        let [share, low, high] = whole.share;
+        assert!(share <= 1.0 && low <= 1.0 && high >= share, "{whole:?}");
+        let more = fit_many_layers(&layers_of(1.4, 0.5, &mut noise), twenty).unwrap_err();
+        assert!(more.to_string().contains("cannot be more than 1: check"), "{more}");
+    }
+
+    #[test]
+    fn squares_of_several_layers_alone_ask_for_squares_of_one() {
+        let points = layers_of(0.2, 0.5, &mut SplitMix(23));
+        let error = fit_widths(&points[10..]).unwrap_err();
+        assert_eq!(error, FitError::NoSingleLayer);
+        assert_eq!(fit_widths(&[]), Err(FitError::TooFew { points: 0, needed: 3 }));
     }
 
     #[test]

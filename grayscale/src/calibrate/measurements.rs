@@ -157,7 +157,10 @@ pub enum DataError {
     #[error("there is neither a column {0} nor {1}")]
     NoIngredient(&'static str, &'static str),
     /// No row has a measurement.
-    #[error("no row below the header holds a measurement")]
+    #[error(
+        "no row below the header holds a measurement: write a row for each film, square or line, with \
+         its measurement"
+    )]
     NoRows,
 }
 
@@ -386,6 +389,10 @@ fn law_columns(
         let lamp = Column::find(table, LAMP).ok_or(DataError::NoColumn(LAMP))?;
         return Ok((LawVariable::Lamp, lamp, None));
     }
+    // Without rows, no ingredient changes.
+    if table.rows().is_empty() {
+        return Err(DataError::NoRows);
+    }
     // The one number of a column, if all its rows have the same.
     let only = |column: Column| -> Result<Option<f64>, DataError> {
         let mut numbers = table.rows().iter().map(|row| column.number(row));
@@ -573,6 +580,7 @@ mod tests {
         let refused = |text: &str| read(text, false).unwrap_err().to_string();
         for (text, words) in [
             (text.replacen("0,6,100", "0,5,100", 1), "both uv_absorber_g_per_100g and photo"),
+            (text.lines().next().unwrap().to_owned(), "no row below the header"),
             (text.replace("50,,", "50,100,2560"), "each"),
             (
                 text.to_owned() + "0.1,6,200,,101,2560\n",

@@ -198,6 +198,25 @@ pub enum FitError {
          higher doses"
     )]
     LastDoseAlone,
+    /// All squares have several layers.
+    #[error(
+        "all squares have several layers, and a line of cure widths is of one layer: print squares of \
+         one layer too, and write 1 as their layers"
+    )]
+    NoSingleLayer,
+    /// More than the whole dose of the layers above would count.
+    #[error(
+        "the share of the doses of layers above is {} +- {}, and cannot be more than 1: check the \
+         column layers, --thickness and the material of the depths",
+        short(*value),
+        short(*half)
+    )]
+    LargeShare {
+        /// The share.
+        value: f64,
+        /// Half of its 95% confidence interval.
+        half: f64,
+    },
     /// Squares of many layers are of several kinds.
     #[error(
         "squares of several layers must have one size and no direction: fit others in a table of \

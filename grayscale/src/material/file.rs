@@ -28,8 +28,10 @@ pub enum MaterialError {
     /// Cure widths of one direction only.
     #[error("cure-width has one direction: give `across` and `along`, or none")]
     OneDirection,
-    /// The share of doses above is below zero.
-    #[error("many-layers.value must be zero or more")]
+    /// The share of doses above is no share.
+    #[error(
+        "many-layers.value is a share of the doses of layers above: write a number from 0 to 1"
+    )]
     ManyLayers,
     /// Nothing says how doses of the layers above fade.
     #[error("many-layers needs to know how light fades: add [working-curve]")]
@@ -291,8 +293,12 @@ source = "notebook, page 3"
         let factor = material.many_layers(Length::from_um(100.0)).unwrap();
         assert!((factor - 1.239_756).abs() < 1e-6, "{factor}");
         assert_eq!(with("").unwrap().many_layers(Length::from_um(100.0)), Ok(1.0));
-        let wrong = with("[many-layers]\nvalue = -0.1\nsource = \"a\"\n").unwrap_err();
-        assert_eq!(wrong, CatalogueError::Check(MaterialError::ManyLayers));
+        for share in ["-0.1", "1.01", "inf", "nan"] {
+            let share = format!("[many-layers]\nvalue = {share}\nsource = \"a\"\n");
+            let wrong = with(&share).unwrap_err();
+            assert_eq!(wrong, CatalogueError::Check(MaterialError::ManyLayers));
+        }
+        assert!(with("[many-layers]\nvalue = 1\nsource = \"a\"\n").is_ok());
     }
 
     #[test]

@@ -285,6 +285,12 @@ impl Material {
         self.laws.iter().find(|law| law.over == over)
     }
 
+    /// Returns whether it has laws over ingredients, from which
+    /// [`of_composition`](Self::of_composition) makes materials.
+    pub fn has_composition_laws(&self) -> bool {
+        self.laws.iter().any(|law| law.over != LawVariable::Lamp)
+    }
+
     /// Checks all laws.
     pub(super) fn check_laws(&self) -> Result<(), MaterialError> {
         for (k, law) in self.laws.iter().enumerate() {

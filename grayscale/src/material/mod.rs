@@ -189,6 +189,12 @@ pub enum ResinError {
     /// It has no cure model.
     #[error("{0} has no cure model: add [working-curve], [gray] or [two-depth] to its file")]
     NoModel(String),
+    /// It has laws over ingredients, which are numbers of many compositions.
+    #[error(
+        "{0} has laws over ingredients, and no cure model of one composition: make a material of one \
+         amount with lamp material make"
+    )]
+    LawsAlone(String),
     /// It does not say the light of full white.
     #[error("{0} does not state how bright full white is: add [intensity] to its file")]
     NoLight(String),
@@ -354,10 +360,10 @@ impl Material {
     /// 3.4.8 a, as `lamp cure` adds doses up), of which a share counts. 1 if the material does not say it.
     ///
     /// # Errors
-    /// Returns an error if the share is below zero, or if no curve says how light fades.
+    /// Returns an error if the share is not from 0 to 1, or if no curve says how light fades.
     pub fn many_layers(&self, thickness: Length) -> Result<f64, MaterialError> {
         let Some(share) = &self.many_layers else { return Ok(1.0) };
-        if !(share.value >= 0.0 && share.value.is_finite()) {
+        if !(0.0..=1.0).contains(&share.value) {
             return Err(MaterialError::ManyLayers);
         }
         let depth = self.white_depth()?.ok_or(MaterialError::NoFadingOfLayers)?;
@@ -394,7 +400,7 @@ impl Material {
             return Ok(FadingLight::new(light, lines.under(light)));
         }
         let curve = self.working_curve()?;
-        let curve = curve.ok_or_else(|| ResinError::NoFading(self.name.clone()))?;
+        let curve = curve.ok_or_else(|| self.without_model(ResinError::NoFading))?;
         Ok(FadingLight::of_curve(light()?, curve).map_err(of("working-curve"))?)
     }
 
@@ -415,8 +421,14 @@ impl Material {
         if let Some(model) = self.two_depth()? {
             return Ok(Box::new(model));
         }
-        let curve = self.working_curve()?.ok_or_else(|| ResinError::NoModel(self.name.clone()))?;
+        let curve = self.working_curve()?.ok_or_else(|| self.without_model(ResinError::NoModel))?;
         Ok(Box::new(curve))
+    }
+
+    /// Returns why there is no model: laws make one of an amount.
+    fn without_model(&self, error: impl FnOnce(String) -> ResinError) -> ResinError {
+        let name = self.name.clone();
+        if self.has_composition_laws() { ResinError::LawsAlone(name) } else { error(name) }
     }
 
     /// Returns the resin under its lamp, by its [`cure_model`](Self::cure_model).

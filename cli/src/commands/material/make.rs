@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::{BestBond, Composition, GivenNumber, LawVariable, Material};
-use lamp_pipeline::documents::{document, read_file};
-use lamp_stack::{Length, format_significant};
+use lamp_pipeline::documents::{document, text_of};
+use lamp_stack::{Catalogued, Length, format_significant};
 
 use crate::args::exposure::parse_overcure;
 use crate::args::options::{Common, parse_thickness};
@@ -110,7 +110,16 @@ pub(super) fn run(args: &MakeArgs, common: &Common) -> Result<(), Exit> {
             (made, left_out(&measured, over))
         }
         (None, None) => {
-            let (mixed, _) = read_file::<Composition>(composition)?;
+            let text = text_of::<Composition>(composition)?;
+            // A material with laws is many compositions.
+            if Material::from_toml(&text).is_ok_and(|measured| measured.has_composition_laws()) {
+                let name = input_name(composition);
+                return Err(Exit::usage(format!(
+                    "{name} has [[law]] tables: give the amount with --uv-absorber GRAMS or \
+                     --photoinitiator GRAMS, or search it with --objective bd"
+                )));
+            }
+            let mixed = Composition::from_toml(&text).map_err(|error| failed(error.into()))?;
             let made = mixed.material().map_err(|error| failed(error.into()))?;
             (made, vec!["these numbers show trends: calibrate before you build".to_owned()])
         }

@@ -208,7 +208,7 @@ fn models_and_widths(material: &Material) -> String {
     models.chain(widths(material)).chain(light_laws(material)).collect::<Vec<_>>().join(", ")
 }
 
-/// How light spreads and how it follows gray levels, and the laws over compositions and the lamp.
+/// How light spreads and adds up, how it follows gray levels, and the laws over compositions and the lamp.
 fn light_laws(material: &Material) -> impl Iterator<Item = String> + '_ {
     let spread = spread_of(material).map(|spread| match spread.sigma() {
         Some(sigma) => format!("spread {sigma}"),
@@ -218,8 +218,9 @@ fn light_laws(material: &Material) -> impl Iterator<Item = String> + '_ {
     let laws = material.laws.iter().map(|law| {
         format!("law over {} ({} to {} {})", law.over, law.least.at, law.most.at, law.over.unit())
     });
+    let many = material.many_layers.as_ref().map(|it| format!("many-layers {}", it.value));
     let overcure = material.overcure.as_ref().map(|it| format!("overcure {}", it.value));
-    spread.into_iter().chain(gamma).chain(overcure).chain(laws)
+    spread.into_iter().chain(gamma).chain(many).chain(overcure).chain(laws)
 }
 
 /// How light spreads. Built-in and checked materials have no faults.
@@ -227,14 +228,20 @@ fn spread_of(material: &Material) -> Option<Spread> {
     material.spread().ok().flatten()
 }
 
-/// The sizes of the squares whose cure widths a material has.
+/// The sizes of the squares whose cure widths a material has, and their directions.
 fn widths(material: &Material) -> Option<String> {
-    let sizes = material.cure_width.iter().map(|numbers| numbers.feature_size);
-    let least = sizes.clone().min_by(|a, b| a.um().total_cmp(&b.um()))?;
-    let most = sizes.max_by(|a, b| a.um().total_cmp(&b.um()))?;
-    Some(match material.cure_width.len() {
-        1 => format!("cure-width (1 size, {least})"),
-        count => format!("cure-width ({count} sizes, {least} to {most})"),
+    let mut sizes: Vec<_> = material.cure_width.iter().map(|it| it.feature_size).collect();
+    sizes.sort_by(|a, b| a.um().total_cmp(&b.um()));
+    // Each direction has its own width of a size.
+    sizes.dedup();
+    let (least, most) = (sizes.first()?, sizes.last()?);
+    let directions = match material.cure_width.iter().any(|it| it.direction.is_some()) {
+        true => ", across and along the scan",
+        false => "",
+    };
+    Some(match sizes.len() {
+        1 => format!("cure-width (1 size, {least}{directions})"),
+        count => format!("cure-width ({count} sizes, {least} to {most}{directions})"),
     })
 }
 
