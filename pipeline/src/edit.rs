@@ -184,6 +184,11 @@ impl Editing {
         Self { list, files, counts }
     }
 
+    /// Returns the list of edits, unless another stack alone is combined.
+    pub fn list(&self) -> Option<&PathBuf> {
+        self.list.as_ref()
+    }
+
     /// Returns all files that are read.
     pub fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
         let EditFiles { stacks, pictures, lists, .. } = &self.files;

@@ -30,13 +30,16 @@ crate::named!(StrutSection {
 pub struct FlowSection {
     /// The form.
     pub section: StrutSection,
-    /// The thickness as a share of the chord, above 0 and up to 1. Round sections have none.
+    /// The thickness as a share of the chord, up to 1. Round sections have none.
     pub thickness_ratio: f64,
     /// The flow's direction, of any length.
     pub flow: [f64; 3],
 }
 
 impl FlowSection {
+    /// The least share of the chord that the thickness of a strut may be: thinner ones break.
+    pub const LEAST_RATIO: f64 = 0.05;
+
     /// Returns the area of a section with a chord, in mm².
     pub fn area_mm2(&self, chord: Length) -> f64 {
         let chord_mm = chord.mm();

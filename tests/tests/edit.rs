@@ -243,7 +243,7 @@ fn copies_have_the_serial_numbers_of_a_list() {
     assert_eq!(masks(&scratch.layers("one.tif")), masks(&written[0]));
     scratch.write("all.toml", list("copies = true", "").as_bytes());
     for (list, words) in [
-        ("A\nB\n", &["build.tif", "art/serials.csv: line 2: the list ends, but copy 3 of 6"][..]),
+        ("A\nB\n", &["all.toml", "art/serials.csv: line 2: the list ends, but copy 3 of 6"][..]),
         ("A\nB\nC\nD\nE\nF\nG\n", &["art/serials.csv: line 7: there is no copy 7"]),
         (
             "A\nB\nA\nD\nE\nF\n",
@@ -367,7 +367,7 @@ fn what_is_wrong_is_said_with_the_edit_and_the_key() {
         ),
         (
             "[[edit]]\nbox = { x = [\"30mm\", \"40mm\"], y = [\"1mm\", \"2mm\"] }\n",
-            &["cube.tif", "edit 1", "no pixel"],
+            &["bad.toml", "edit 1", "no pixel"],
         ),
         (
             "[[edit]]\nlabel = { text = \"\u{3a9}\", at = [[\"0mm\", \"0mm\"]], height = \"1mm\" }\n",
@@ -466,6 +466,24 @@ fn a_table_makes_a_stack_or_a_list_of_each_row() {
         .run("lamp edit - edits.toml --variants table.csv -o w-{name}.tif")
         .is_wrong_usage(&["name files"]);
     assert_eq!(scratch.names().len(), names.len() + 1);
+}
+
+#[test]
+fn a_fault_of_a_list_names_the_list() {
+    let scratch = with_cube();
+    let crop = "[[edit]]\ncrop = { x = [\"90mm\", \"91mm\"], y = [\"0mm\", \"1mm\"] }\n";
+    scratch.write("crop.toml", crop.as_bytes());
+    let ran = scratch.run("lamp edit cube.tif crop.toml -o x.tif");
+    ran.clone().is_refused_with(&["crop.toml: edit 1: nothing is left"]);
+    assert!(!ran.stderr.contains("cube.tif"), "{ran:?}");
+    // Without a list, the stack is at fault.
+    scratch.part("torus.stl", Sample::Torus, 800);
+    scratch.run("slice torus.stl --dpi 50 -o torus.tif").succeeds_quietly();
+    scratch.run("lamp edit cube.tif --xor torus.tif -o x.tif").is_refused_with(&["cube.tif: "]);
+    scratch.write("table.csv", b"1.crop.z\n1mm\n");
+    scratch
+        .run("lamp edit cube.tif crop.toml --variants table.csv -o v-{name}.tif")
+        .is_refused_with(&["table.csv", "write a key that the edit lacks into the list first"]);
 }
 
 #[test]

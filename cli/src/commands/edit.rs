@@ -117,7 +117,9 @@ fn make_variants(args: &EditArgs, list: &Path, table: &Path, common: &Common) ->
         check_not_input(&output.output, inputs)?;
         let text = variants.list(k);
         if is_list {
+            let progress = progress("edit", common, &output);
             write_file(&output.output, |out| out.write_all(text.as_bytes()))?;
+            progress.wrote(&output.output, &[]);
             continue;
         }
         let editing = Editing::of_variant(list, &text)?;
@@ -147,9 +149,11 @@ fn make(
     write_layers(edited, output, &progress).map_err(|error| match error {
         // A page that cannot be decoded names its stack.
         error if matches!(error.cause(), Some(EditError::Page(_))) => error,
-        Exit::Failed(error) if error.is::<EditError>() => {
-            Exit::Failed(error).at(input_name(&args.input.stack))
-        }
+        Exit::Failed(error) => match (error.downcast_ref::<EditError>(), editing.list()) {
+            (Some(EditError::Edit { .. }), Some(list)) => Exit::Failed(error).at(input_name(list)),
+            (Some(_), _) => Exit::Failed(error).at(input_name(&args.input.stack)),
+            (None, _) => Exit::Failed(error),
+        },
         error => error,
     })?;
     let counts = editing.counts();

@@ -95,7 +95,9 @@ fn a_streamlined_strut_is_round_if_it_is_as_thick_as_long_and_needs_all_its_keys
         (", flow = [1, 0, 0]", "belong to section"),
         (", section = \"ellipse\", flow = [1, 0, 0]", "need both"),
         (", section = \"aerofoil\", thickness_ratio = 0.3", "need both"),
-        (", section = \"aerofoil\", thickness_ratio = 0.0, flow = [1, 0, 0]", "no share"),
+        (", section = \"aerofoil\", thickness_ratio = 0.0, flow = [1, 0, 0]", "from 0.05"),
+        (", section = \"aerofoil\", thickness_ratio = 0.049, flow = [1, 0, 0]", "from 0.05"),
+        (", section = \"aerofoil\", thickness_ratio = 0.3, flow = [1, 0, 0, 0]", "4 numbers"),
         (", section = \"aerofoil\", thickness_ratio = 0.3, flow = [0, 0, 0]", "flow needs"),
         (", section = \"oval\"", "oval"),
     ] {

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::loft::cross;
 use super::pattern::Repeat;
-use super::schema::{LoftSection, LoftShape, distance, lengths, size, some_distance};
+use super::schema::{LoftSection, LoftShape, distance, lengths, numbers, size, some_distance};
 
 /// The keys of a film-cooling hole.
 #[derive(Clone, Debug, Deserialize)]
@@ -18,8 +18,10 @@ pub(super) struct FilmHole {
     #[serde(deserialize_with = "lengths")]
     exit: [Length; 3],
     /// The direction of the mainstream at the exit.
+    #[serde(deserialize_with = "numbers")]
     flow: [f64; 3],
     /// The outward direction of the surface there.
+    #[serde(deserialize_with = "numbers")]
     normal: [f64; 3],
     /// The inclination of the axis to the surface, in degrees; of a curved hole, before its bend.
     angle: f64,
@@ -79,6 +81,12 @@ pub enum FilmHoleProblem {
     /// A row has a number of holes, or a distance, alone.
     #[error("a row needs both count and pitch_ratio")]
     HalfRow,
+    /// The holes of a row run into each other.
+    #[error(
+        "pitch_ratio is {0:?}: holes of a row overlap below 1: write the distance of their axes in \
+         diameters"
+    )]
+    CloseRow(f64),
     /// A row has no hole, or too many.
     #[error("count is {0}, and may be 1 to 100000")]
     Count(u32),
@@ -180,8 +188,11 @@ impl FilmHole {
         let loft = LoftShape { path, bend, across: Some(span), sections };
         let row = match (self.count, self.pitch_ratio) {
             (Some(count), Some(pitch)) => {
-                let pitch = ratio("pitch_ratio", pitch)?;
-                let step = span.map(|part| Length::from_mm(part * pitch));
+                let distance = ratio("pitch_ratio", pitch)?;
+                if pitch < 1.0 {
+                    return Err(FilmHoleProblem::CloseRow(pitch));
+                }
+                let step = span.map(|part| Length::from_mm(part * distance));
                 Some(Repeat::line(count, step).ok_or(FilmHoleProblem::Count(count))?)
             }
             (None, None) => None,

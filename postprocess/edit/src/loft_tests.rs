@@ -537,6 +537,9 @@ fn keys_of_holes_that_make_none_are_named() {
         (film_hole(&format!("{hole}\ncount = 3")), "both count and pitch_ratio"),
         (film_hole(&format!("{hole}\ncount = 0\npitch_ratio = 3")), "count is 0"),
         (film_hole(&format!("{hole}\ncount = 2\npitch_ratio = nan")), "pitch_ratio must be"),
+        (film_hole(&format!("{hole}\ncount = 2\npitch_ratio = 0.99")), "overlap below 1"),
+        (film_hole(hole).replace("[0, 0, 1]", "[0, 0, 1, 0]"), "4 numbers where 3"),
+        (film_hole(hole).replace("[0, 0, 1]", "[0, 1]"), "2 numbers where 3"),
         (film_hole("diameter = \"1mm\"\nangle = 100\nlength_ratio = 4"), "up to 90"),
         (film_hole(hole).replace("flow = [1, 0, 0]", "flow = [0, 0, 2]"), "flow and normal"),
         (

@@ -6,7 +6,7 @@ use std::fmt::Display;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use lamp_stack::{Length, LengthError, Op, Orientation, StrutSection};
+use lamp_stack::{FlowSection, Length, LengthError, Op, Orientation, StrutSection};
 use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::film_hole::FilmHole;
@@ -159,6 +159,7 @@ pub(super) struct StrutEnds {
     #[serde(default, deserialize_with = "some_ratio")]
     pub(super) thickness_ratio: Option<f64>,
     /// The direction from the leading to the trailing edge.
+    #[serde(default, deserialize_with = "some_numbers")]
     pub(super) flow: Option<[f64; 3]>,
 }
 
@@ -194,6 +195,7 @@ pub(super) struct LoftShape {
     #[serde(default, deserialize_with = "some_size")]
     pub(super) bend: Option<Length>,
     /// The direction of the width at the path's start; only its part across the path counts.
+    #[serde(default, deserialize_with = "some_numbers")]
     pub(super) across: Option<[f64; 3]>,
     pub(super) sections: Vec<LoftSection>,
 }
@@ -337,6 +339,18 @@ fn length<E: serde::de::Error>(text: &str) -> Result<Length, E> {
     Ok(length)
 }
 
+/// Reads a vector. A longer list is no vector, which the reader of TOML would cut off.
+pub(super) fn numbers<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 3], D::Error> {
+    let numbers = Vec::<f64>::deserialize(from)?;
+    let count = numbers.len();
+    let vector = numbers.try_into();
+    vector.map_err(|_| D::Error::custom(format!("{count} numbers where 3 are needed")))
+}
+
+fn some_numbers<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+    numbers(from).map(Some)
+}
+
 /// Reads a list of lengths.
 pub(super) fn lengths_of<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Length>, D::Error> {
     // As texts, since a length without its unit is refused.
@@ -435,9 +449,14 @@ fn named<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(from: D) -> Result
 }
 
 fn some_ratio<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    let least = FlowSection::LEAST_RATIO;
     match f64::deserialize(from)? {
-        ratio if ratio > 0.0 && ratio <= 1.0 => Ok(Some(ratio)),
-        ratio => Err(D::Error::custom(format!("{ratio} is no share: write one above 0, up to 1"))),
+        ratio if (least..=1.0).contains(&ratio) => Ok(Some(ratio)),
+        ratio => {
+            let why =
+                format!("{ratio:?} is no thickness of a strut: write a share from {least} to 1");
+            Err(D::Error::custom(why))
+        }
     }
 }
 

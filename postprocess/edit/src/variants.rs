@@ -73,8 +73,8 @@ pub enum VariantError {
     Table(ListProblem),
     /// A column does not name a value of the list.
     #[error(
-        "column `{0}`: the list has no such value: write the number of the edit, from 1, and its keys, \
-         such as 1.cylinder.diameter"
+        "column `{0}`: the list has no such value: a column is the number of the edit, from 1, and its \
+         keys, such as 1.cylinder.diameter; write a key that the edit lacks into the list first"
     )]
     UnknownColumn(String),
     /// Two columns have one name.
