@@ -146,6 +146,19 @@ impl HeightSettings {
             _ => Measure::Volume,
         };
         let criterion = self.criterion.unwrap_or(default);
+        let least_length = |bound: &ByHeight<Length>| bound.map(|it| it.um()).least_and_most()[0];
+        let least_share = |bound: &ByHeight<Share>| bound.map(|it| it.0).least_and_most()[0];
+        for (option, least, example) in [
+            ("deviation", self.deviation.as_ref().map(least_share), "2%"),
+            ("cusp", self.cusp.as_ref().map(least_length), "10um"),
+            ("ra", self.ra.as_ref().map(least_length), "6um"),
+        ] {
+            // No layer of a slanted wall is without an error.
+            if least.is_some_and(|least| least <= 0.0) {
+                let why = format!("--{option} must be above zero, such as {example}");
+                return Err(Error::settings(why));
+            }
+        }
         for (measure, bound, example) in
             [(Measure::Cusp, &self.cusp, "--cusp 10um"), (Measure::Ra, &self.ra, "--ra 6um")]
         {

@@ -154,7 +154,9 @@ impl SliceSettings {
         if let Some(exposure) = &exposure {
             let thicknesses: Vec<_> = uniform.into_iter().chain(stated).collect();
             thicknesses.iter().try_for_each(|thickness| exposure.check(*thickness))?;
-            let doubts = exposure.doubts(thicknesses.into_iter());
+            // The search for adaptive heights remarks on the doses of its layers.
+            let is_found = matches!(self.thickness, Thickness::Adaptive { .. });
+            let doubts = if is_found { vec![] } else { exposure.doubts(thicknesses.into_iter()) };
             doubts.into_iter().for_each(|doubt| watcher.remark(Remark::note(doubt)));
         }
         let slices = Slices::new(model, &options)?;

@@ -216,7 +216,8 @@ fn every_stage_keeps_what_layers_say() {
         "slice tower.stl --dpi 200 --adaptive {LIMITS} --deviation 5% --material lamp-suspension"
     );
     let said = scratch.run(&format!("{slice} -o plain.tif")).succeeds().stderr;
-    assert!(said.contains("lamp-suspension was measured at 320 to 1920 mJ/cm2"), "{said}");
+    let doubt = "lamp-suspension was measured at 320 to 1920 mJ/cm2";
+    assert_eq!(said.matches(doubt).count(), 1, "{said}");
     let stages =
         "fix -q | lamp compensate --uniform 127um -q | dither -q | tile --mesh none -q > build.tif";
     scratch.run(&format!("{slice} -q | {stages}")).succeeds_quietly();
@@ -328,6 +329,8 @@ fn what_cannot_be_is_said() {
     usage("lamp heights tower.stl --plot x.pdf", "end its name in .svg, .png or .csv");
     usage("lamp heights tower.stl --plot x.svg --csv x.svg", "a table is CSV");
     usage("lamp heights tower.stl --deviation 2", "write 2% or 0.02");
+    usage("lamp heights tower.stl --deviation 2%@..5mm,0%@5mm..", "--deviation must be above zero");
+    usage("slice tower.stl --adaptive --cusp 0um", "above zero");
     usage(
         "slice tower.stl --adaptive --gray --material lamp-suspension --exposure-table times.csv",
         "cannot be used with",
