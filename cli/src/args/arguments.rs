@@ -113,7 +113,7 @@ impl Arguments {
     fn new(lamp: &Command, program: Command, words: Vec<OsString>) -> Self {
         let mut lamp = lamp.clone();
         lamp.build();
-        Self { lamp, program, words, from: Vec::new() }
+        Self { lamp, program, words: with_signed_values(words), from: Vec::new() }
     }
 
     /// Adds what files say: the file that the command line names, then files that apply to every
@@ -228,6 +228,33 @@ impl Arguments {
     }
 }
 
+/// Returns the words of a command line with each value that begins with a minus sign joined to its
+/// option: `--uniform -10um` becomes `--uniform=-10um`.
+///
+/// No option is called by a digit, so that such a word is a value. Options that took every word that begins
+/// with a minus sign would take the next option, too.
+pub(crate) fn with_signed_values(words: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+    let is_signed = |word: &OsString| {
+        matches!(word.as_encoded_bytes(), [b'-', b'0'..=b'9', ..] | [b'-', b'.', b'0'..=b'9', ..])
+    };
+    let is_option = |word: &OsString| {
+        let word = word.as_encoded_bytes();
+        word.starts_with(b"--") && !word.contains(&b'=')
+    };
+    let (mut joined, mut is_ended) = (Vec::<OsString>::new(), false);
+    for word in words {
+        is_ended |= word == "--";
+        match joined.last_mut().filter(|last| !is_ended && is_signed(&word) && is_option(last)) {
+            Some(option) => {
+                option.push("=");
+                option.push(word);
+            }
+            None => joined.push(word),
+        }
+    }
+    joined
+}
+
 /// Returns the words of settings, but of none that is given already or contradicts what is.
 pub(crate) fn words_left_open(
     command: &Command,
@@ -266,4 +293,71 @@ pub(crate) fn settings_of_machine(file: &Path) -> Result<Vec<Setting>, Exit> {
         Some(Setting { key: key.to_owned(), words: vec![format!("--{key}={}", value?).into()] })
     };
     Ok(settings.into_iter().filter_map(setting).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Arg, ArgAction};
+
+    use super::*;
+
+    fn joined(line: &str) -> String {
+        let words = with_signed_values(line.split(' ').map(OsString::from));
+        words.iter().map(|word| word.to_str().unwrap()).collect::<Vec<_>>().join(" ")
+    }
+
+    #[test]
+    fn values_below_zero_belong_to_their_option() {
+        for (line, expected) in [
+            (
+                "lamp compensate a.tif --uniform -10um -o b.tif",
+                "lamp compensate a.tif --uniform=-10um -o b.tif",
+            ),
+            ("lamp --z -.5mm", "lamp --z=-.5mm"),
+            ("lamp --z=1mm -1mm", "lamp --z=1mm -1mm"),
+            ("lamp --output --quiet", "lamp --output --quiet"),
+            ("lamp --output -", "lamp --output -"),
+            ("lamp -o -1", "lamp -o -1"),
+            ("lamp --quiet -- -1", "lamp --quiet -- -1"),
+            ("lamp -- --z -1", "lamp -- --z -1"),
+            ("-1", "-1"),
+        ] {
+            assert_eq!(joined(line), expected);
+        }
+    }
+
+    /// By all commands: each option that takes a value gets one that begins with a minus sign.
+    #[test]
+    fn no_option_mistakes_a_value_below_zero_for_an_argument() {
+        let mut lamp =
+            crate::terminal::help::formed(<crate::Lamp as clap::CommandFactory>::command());
+        lamp.build();
+        let mut tried = 0;
+        each_command(&lamp, &mut |command| {
+            for option in command.get_arguments().filter(|option| takes_value(option)) {
+                let Some(name) = option.get_long() else { continue };
+                let words = [format!("--{name}"), "-1mm".to_owned()].map(OsString::from);
+                let alone = command.clone().no_binary_name(true).ignore_errors(false);
+                let error = alone.try_get_matches_from(with_signed_values(words)).err();
+                let kind = error.map(|error| error.kind());
+                assert_ne!(
+                    kind,
+                    Some(ErrorKind::UnknownArgument),
+                    "{} --{name}",
+                    command.get_name()
+                );
+                tried += 1;
+            }
+        });
+        assert!(tried > 300, "{tried}");
+    }
+
+    fn takes_value(option: &Arg) -> bool {
+        matches!(option.get_action(), ArgAction::Set | ArgAction::Append)
+    }
+
+    fn each_command(command: &Command, look: &mut impl FnMut(&Command)) {
+        look(command);
+        command.get_subcommands().for_each(|command| each_command(command, look));
+    }
 }

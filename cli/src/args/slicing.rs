@@ -33,7 +33,7 @@ pub(crate) struct SlicingArgs {
     ///
     /// Contours and masks of layouts have their own layers. Other files state none
     #[arg(long, alias = "layer-height", value_name = "LENGTH", value_parser = parse_thickness)]
-    #[arg(allow_hyphen_values = true, conflicts_with = "adaptive")]
+    #[arg(conflicts_with = "adaptive")]
     thickness: Option<Length>,
 
     /// Height in each layer at which the part is cut
@@ -68,7 +68,6 @@ pub(crate) struct SlicingArgs {
     /// Top left corner of the image in part coordinates, in millimeters [default: from the part's
     /// bounding box]. The image must contain the part and keep its last column black
     #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
-    #[arg(allow_hyphen_values = true)]
     origin: Option<FiniteNumbers<2>>,
 
     /// Size of the image, for example 80x80mm or 4x4.5in; needs --origin

@@ -67,7 +67,6 @@ pub(crate) struct PlacementArgs {
     /// Scale the part, by one factor or a factor for each axis: 1.02 makes up for about 2% of
     /// shrinkage
     #[arg(long, value_name = "F|X,Y,Z", value_parser = parse_scale, help_heading = PLACEMENT)]
-    #[arg(allow_hyphen_values = true)]
     scale: Option<FiniteNumbers<3>>,
 
     /// Mirror the part: x swaps left and right
@@ -85,7 +84,6 @@ pub(crate) struct PlacementArgs {
     /// Move the part, in millimeters. The image moves with the part: its origin and the layers'
     /// heights are in the moved part's coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_translation, help_heading = PLACEMENT)]
-    #[arg(allow_hyphen_values = true)]
     translate: Option<FiniteNumbers<3>>,
 }
 

@@ -13,7 +13,7 @@ use lamp_pipeline::dither::DitherSettings;
 use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
 use lamp_pipeline::support::{Curvature, Degrees, FlowAngle, SupportSettings};
-use lamp_stack::{Length, Op, StrutSection};
+use lamp_stack::{FlowSection, Length, Op, StrutSection};
 use lamp_supports::{
     AvoidedSurface, CheckOptions, FindingGroup, PillarSizes, SupportFoot, SupportOptions,
     avoided_surfaces,
@@ -53,7 +53,7 @@ pub(crate) struct FixStageArgs {
 pub(crate) struct CompensateStageArgs {
     /// Move all edges inwards by this distance, or outwards if it is negative; 25x40um moves edges by
     /// an ellipse, 25 um along x and 40 um along y
-    #[arg(long, value_name = "LENGTH|XxY", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LENGTH|XxY")]
     uniform: Option<EdgeDistance>,
 
     /// Move edges inwards by the cure width of a material: a built-in one or a file (see lamp material)
@@ -70,7 +70,7 @@ pub(crate) struct CompensateStageArgs {
 
     /// Keep walls at least this wide, and thinner walls unchanged; 0um lets walls vanish [default:
     /// two pixels]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     min_feature: Option<Length>,
 
     /// Round edges to whole pixels, without gray
@@ -78,7 +78,7 @@ pub(crate) struct CompensateStageArgs {
     one_bit: bool,
 
     /// Shrinkage s in firing, for example 2.1% or x:2.1%,y:1.8%: images are enlarged by 1 / (1 - s)
-    #[arg(long, value_name = "SHARE", allow_hyphen_values = true)]
+    #[arg(long, value_name = "SHARE")]
     shrinkage: Option<FiringShrinkage>,
 }
 
@@ -445,7 +445,10 @@ fn parse_dose(text: &str) -> Result<Dose, String> {
 
 fn parse_thickness_ratio(text: &str) -> Result<f64, String> {
     let share = parse_percent(text)?;
-    if share < 0.05 { Err(format!("`{text}` is too thin: write at least 5%")) } else { Ok(share) }
+    match share < FlowSection::LEAST_RATIO {
+        true => Err(format!("`{text}` is too thin: write at least 5%")),
+        false => Ok(share),
+    }
 }
 
 /// Parses a share: `25%` or `0.25`.

@@ -34,11 +34,11 @@ pub(crate) struct TileStageArgs {
 
     /// Smallest distance between copies [default: twice the mesh's clearance plus 2mm; 1mm with
     /// --mesh none]. With --layout, closer copies cause a warning
-    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     gap: Option<Length>,
 
     /// Smallest distance between copies and the area's edges
-    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     #[arg(default_value = "0mm")]
     edge_gap: Length,
 
@@ -113,7 +113,6 @@ pub(crate) struct MeshStageArgs {
     /// Smallest area of a piece of mesh in a layer. Smaller pieces are left out, as are pieces not
     /// joined to mesh below; 0 keeps all joined pieces [default: 1mm2]
     #[arg(long, value_name = "AREA", value_parser = parse_area, help_heading = HEADING)]
-    #[arg(allow_hyphen_values = true)]
     least_piece: Option<f64>,
 
     /// Width of the break lines. They run through the mesh from each part up, down, left and right

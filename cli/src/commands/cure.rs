@@ -69,7 +69,7 @@ pub(crate) struct CureArgs {
     part: Vec<PartFile>,
 
     /// Draw only this part of the section, for example 10mm..14mm
-    #[arg(long, value_name = "A..B", value_parser = parse_along, allow_hyphen_values = true)]
+    #[arg(long, value_name = "A..B", value_parser = parse_along)]
     along: Option<Range<f64>>,
 
     /// Add up the doses of all layers (the default)

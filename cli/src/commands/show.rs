@@ -82,7 +82,7 @@ struct ShownLayers {
 
     /// Show the layer at this height, for example 12mm; where two layers meet, it shows the upper
     /// layer
-    #[arg(long, value_name = "HEIGHT", allow_hyphen_values = true)]
+    #[arg(long, value_name = "HEIGHT")]
     z: Option<Length>,
 
     /// Show all layers from A to B - 1 on one sheet; A..B/N shows every Nth layer

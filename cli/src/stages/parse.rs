@@ -22,7 +22,7 @@ use lamp_supports::DesignRules;
 
 use super::after::After;
 use crate::Lamp;
-use crate::args::arguments::{settings_of_machine, words_left_open};
+use crate::args::arguments::{settings_of_machine, with_signed_values, words_left_open};
 use crate::args::planning_options::PlanningOptions;
 use crate::args::slicing::SliceStageArgs;
 use crate::args::stages::{CompensateStageArgs, DitherStageArgs, EditStageArgs, FixStageArgs};
@@ -175,7 +175,7 @@ impl<'a> StageReader<'a> {
         let lamp = LAMP.get_or_init(|| formed(Lamp::command()));
         let mut command = crate::stage(lamp, name);
         command.build();
-        let mut words: Vec<OsString> = words.iter().map(OsString::from).collect();
+        let mut words = with_signed_values(words.iter().map(OsString::from));
         // The words that the list of stages leaves out.
         match name {
             "slice" => words.push(PART.into()),

@@ -1,5 +1,6 @@
 //! Chains against the pipelines that people type.
 
+use std::ffi::OsString;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ use super::after::After;
 use super::calls::{CheckFindings, Checking, Tiling};
 use super::parse::{parse, parse_check, parse_tile};
 use crate::Lamp;
+use crate::args::arguments::with_signed_values;
 use crate::args::options::Common;
 use crate::exit::Exit;
 
@@ -74,6 +76,7 @@ impl Bench {
             None => word.to_owned(),
         };
         let words = ["lamp".to_owned()].into_iter().chain(line.split_whitespace().map(word));
+        let words = with_signed_values(words.map(OsString::from));
         let Lamp { command, .. } = Lamp::parse_from(words);
         command.run(&Common::quiet()).unwrap_or_else(|error| panic!("{line}: {error}"));
     }
