@@ -104,6 +104,11 @@ fn no_frames_and_no_job_make_their_readers_panic_or_contradict_themselves() {
 }
 
 #[test]
+fn no_table_of_variants_makes_its_reader_panic_or_contradict_itself() {
+    survives("variants", hostile::variants);
+}
+
+#[test]
 fn files_by_other_programs_hold_no_surprise() {
     for (kind, entry) in [("stl", hostile::stl as fn(&[u8])), ("tiff", hostile::tiff)] {
         let Some(folder) = shared_data(kind) else {

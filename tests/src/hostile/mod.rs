@@ -8,11 +8,13 @@ mod damage;
 mod facets;
 mod seeds;
 
+use std::collections::HashSet;
 use std::error::Error;
 use std::io::{Cursor, Write};
 use std::path::Path;
 
 use fax::decoder::decode_g4;
+use lamp_edit::{Edits, Variants};
 use lamp_gantry::{FrameReader, FrameWriter, Job};
 use lamp_slicing::topology::{CornerTable, Crossings, MeshCheck, RepairOptions, Repaired, repair};
 use lamp_slicing::{
@@ -356,6 +358,33 @@ pub fn scan(bytes: &[u8]) {
             assert_eq!(Job::read(&text, name).expect("it was read"), job);
         }
         Err(error) => drop(one_line(&error)),
+    }
+}
+
+/// The line between a list of edits and a table of variants.
+const TABLE: &str = "\n===\n";
+
+/// Reads bytes as a list of edits and, below a line `===`, a table of its variants. Each variant has a
+/// name of its own, and is a list of edits with as many edits.
+///
+/// # Panics
+/// If that does not hold.
+pub fn variants(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let (list, table) = text.split_once(TABLE).unwrap_or((text, ""));
+    let edits = match Edits::from_toml(list) {
+        Ok(edits) => edits,
+        Err(error) => return drop(one_line(&error)),
+    };
+    let variants = match Variants::read(list, table) {
+        Ok(variants) => variants,
+        Err(error) => return drop(one_line(&error)),
+    };
+    let names: HashSet<_> = variants.names().collect();
+    assert_eq!(names.len(), variants.names().len());
+    for variant in 0..names.len() {
+        let of_row = Edits::from_toml(&variants.list(variant)).expect("it was read before");
+        assert_eq!(of_row.count(), edits.count());
     }
 }
 

@@ -52,6 +52,7 @@ pub fn seeds() -> Vec<Seed> {
         .chain(blocks().into_iter().map(of("check")))
         .chain(meshes().into_iter().map(of("mesh")))
         .chain(scans().into_iter().map(of("scan")))
+        .chain(tables_of_variants().into_iter().map(of("variants")))
         .collect()
 }
 
@@ -657,5 +658,31 @@ fn scans() -> Named {
         ("swath.frames", writer.finish().expect("memory takes all")),
         ("job.json", job.as_bytes().to_vec()),
         ("tilted.json", tilted.into_bytes()),
+    ]
+}
+
+/// Lists of edits of several kinds, with tables of variants.
+fn tables_of_variants() -> Named {
+    const HOLE: &str = "[[edit]]\nop = \"subtract\"\n[edit.film_hole]\n\
+        exit = [\"1mm\", \"0mm\", \"10mm\"]\nflow = [1, 0, 0]\nnormal = [0, 0, 1]\nangle = 30\n\
+        diameter = \"0.8mm\"\nlength_ratio = 6\nmetering_ratio = 2\nlateral_angle = 14\ncount = 6\n\
+        pitch_ratio = 3\n";
+    const LABEL: &str = "[[edit]]\nz = [\"0mm\", \"1mm\"]\nrepeat = { count = 3, step = [\"1mm\", \"0mm\"] }\n\
+        label = { text = \"SN {n:04}\", start = 7, at = [[\"0mm\", \"0mm\"]], height = \"2mm\" }\n\
+        [[edit]]\nstrut = { from = [\"0mm\", \"0mm\", \"0mm\"], to = [\"1mm\", \"0mm\", \"9mm\"], \
+        diameter = \"1mm\", section = \"aerofoil\", thickness_ratio = 0.3, flow = [1, 0, 0] }\n";
+    let of = |list: &str, table: &str| format!("{list}===\n{table}").into_bytes();
+    vec![
+        (
+            "holes.txt",
+            of(
+                HOLE,
+                "name,1.film_hole.angle,1.film_hole.exit.2,1.film_hole.flow\na,35.5,,\n\"b c\",,1mm,\"[0, 1, 0]\"\n",
+            ),
+        ),
+        ("labels.txt", of(LABEL, "1.label.text,1.repeat.count,2.strut.to.3\n{n},2,8mm\nX,,\n")),
+        ("unknown.txt", of(LABEL, "name,3.label.text\na,b\n")),
+        ("twice.txt", of(HOLE, "name,1.film_hole.angle\na,30\nA,40\n")),
+        ("list.txt", HOLE.as_bytes().to_vec()),
     ]
 }
