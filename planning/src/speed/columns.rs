@@ -87,10 +87,17 @@ impl ColumnSet {
         self.weights.push(weight);
     }
 
-    /// Adds the columns of another set, each with `times` its weight.
-    pub(crate) fn add_all(&mut self, other: &Self, times: f64) {
+    /// Adds a column as [`add`](Self::add) does, unless no light reaches it and no voxel is wanted.
+    pub(crate) fn add_lit(&mut self, column: &[f32], weight: f64) {
+        if column.iter().any(|&light| light != 0.0 || light.is_sign_negative()) {
+            self.add(column, weight);
+        }
+    }
+
+    /// Adds the columns of another set.
+    pub(crate) fn add_all(&mut self, other: &Self) {
         for (number, weight) in other.weights.iter().enumerate() {
-            self.add(other.column(number), weight * times);
+            self.add(other.column(number), *weight);
         }
     }
 
@@ -126,10 +133,10 @@ mod tests {
         }
         let mut all = ColumnSet::new(2);
         all.add(&[-0.5, 0.0], 5.0);
-        all.add_all(&set, 10.0);
+        all.add_all(&set);
         let columns = all.finish();
         let [block] = columns.blocks() else { panic!("one block is enough") };
-        assert_eq!(block.weights[..4], [15.0, 20.0, 10.0, 0.0]);
+        assert_eq!(block.weights[..4], [6.0, 2.0, 1.0, 0.0]);
         assert_eq!(block.light[..3], [-0.5, 0.5, 0.5]);
         assert!(block.light[LANES + 1].is_sign_negative());
         assert!(block.light[LANES + 2].is_sign_positive());

@@ -80,11 +80,9 @@ impl<'a> Gather<'a> {
     }
 
     /// Calls `each` with the columns of every tile, on all threads, and returns the results in
-    /// order. One pixel in each `step` x `step` square is taken, at a place that differs from
-    /// square to square, and stands for all of them.
+    /// order.
     pub(crate) fn tiles<T: Send>(
         &self,
-        step: u32,
         each: impl Fn(ColumnSet) -> T + Sync,
     ) -> impl Iterator<Item = T> {
         // A batch's results are merged before the next begins.
@@ -92,8 +90,7 @@ impl<'a> Gather<'a> {
         // results wait.
         let batch = 2 * rayon::current_num_threads();
         self.tiles.chunks(batch).flat_map(move |corners| {
-            let tile =
-                |room: &mut TileRoom, &corner: &[i64; 2]| each(self.tile(corner, step, room));
+            let tile = |room: &mut TileRoom, &corner: &[i64; 2]| each(self.tile(corner, room));
             corners.par_iter().map_init(TileRoom::default, tile).collect::<Vec<_>>()
         })
     }
@@ -104,29 +101,94 @@ impl<'a> Gather<'a> {
         let layers = self.part.images.len();
         let most = (bytes / (layers * size_of::<f32>())).max(1);
         let mut step = 1;
-        // Merging would have to join over 64 pixels in each column: such samples are not tried.
-        while self.pixels() / (step as usize * step as usize) > 64 * most {
+        // Merging would have to join over 16 pixels in each column, or over 4 in each of a sample, whose
+        // pixels are farther apart: these are not tried.
+        while self.pixels() / (step as usize * step as usize)
+            > most * if step == 1 { 16 } else { 4 }
+        {
             step *= 2;
         }
         loop {
-            if let Some(columns) = self.sample(step, most) {
+            let columns = if step == 1 { self.all(most) } else { self.sample(step, most) };
+            if let Some(columns) = columns {
                 return (columns, step * step);
             }
             step *= 2;
         }
     }
 
-    /// Returns the columns of a sample, if there are at most `most`.
-    fn sample(&self, step: u32, most: usize) -> Option<PixelColumns> {
+    /// Returns the columns of all pixels, if there are at most `most`.
+    fn all(&self, most: usize) -> Option<PixelColumns> {
         let mut all = ColumnSet::new(self.part.images.len());
-        for tile in self.tiles(step, |tile| tile) {
-            all.add_all(&tile, 1.0);
+        for tile in self.tiles(|tile| tile) {
+            all.add_all(&tile);
+            if all.len() > most {
+                return None;
+            }
+        }
+        Some(all.finish())
+    }
+
+    /// Returns the columns of one pixel in each `step` x `step` square, if there are at most `most`.
+    fn sample(&self, step: u32, most: usize) -> Option<PixelColumns> {
+        let layers = self.part.images.len();
+        let weight = f64::from(step * step);
+        let places = self.tiles.iter().flat_map(|corner| sampled(*corner, self.side, step));
+        let places: Vec<_> = places.collect();
+        let mut all = ColumnSet::new(layers);
+        let mut column = vec![0.0; layers];
+        for places in places.chunks(4 * most) {
+            let light = self.light_of_pixels(places);
+            for number in 0..places.len() {
+                let of_layers = light.iter().map(|lights| lights[number]);
+                column.iter_mut().zip(of_layers).for_each(|(to, light)| *to = light);
+                all.add_lit(&column, weight);
+            }
             // With one pixel of each tile, no coarser sample exists.
             if all.len() > most && step < self.side as u32 {
                 return None;
             }
         }
         Some(all.finish())
+    }
+
+    /// Returns the light of some pixels, layer by layer.
+    fn light_of_pixels(&self, pixels: &[[i64; 2]]) -> Vec<Vec<f32>> {
+        let of_layer = |levels: &mut Vec<u8>, image: &Image| {
+            let blocks = Blocks::of(image, self.blur.radius());
+            let light = |&pixel: &[i64; 2]| self.light_of_pixel(image, &blocks, pixel, levels);
+            pixels.iter().map(light).collect()
+        };
+        self.part.images.par_iter().map_init(Vec::new, of_layer).collect()
+    }
+
+    /// Returns the light of a pixel, whose sign is its role.
+    fn light_of_pixel(
+        &self,
+        image: &Image,
+        blocks: &Blocks,
+        pixel: [i64; 2],
+        levels: &mut Vec<u8>,
+    ) -> f32 {
+        let reach = self.blur.radius();
+        let role = |level: u8| if level >= self.part.wanted() { -1.0 } else { 1.0 };
+        // Most pixels are far from any edge. Their light is the same number as in tiles.
+        if let Some(level) = blocks.level_around(pixel, reach as i64) {
+            return self.light_of[usize::from(level)] * self.blur.sum() as f32 * role(level);
+        }
+        let side = 2 * reach + 1;
+        levels.resize(side * side, 0);
+        fill_window(image, pixel.map(|place| place - reach as i64), side, levels);
+        let [along, across] = self.blur.taps();
+        let tap = |taps: &[f32], place: usize| taps.get(place.abs_diff(reach)).copied();
+        let mut sum = 0.0;
+        for (row, line) in levels.chunks_exact(side).enumerate() {
+            let Some(weight) = tap(across, row) else { continue };
+            let lights = line.iter().map(|&level| self.light_of[usize::from(level)]);
+            let lit = lights.enumerate().map(|(at, light)| light * tap(along, at).unwrap_or(0.0));
+            sum += weight * lit.sum::<f32>();
+        }
+        sum * role(levels[reach * side + reach])
     }
 
     /// Returns the light at a pixel in each layer.
@@ -167,16 +229,15 @@ impl<'a> Gather<'a> {
     }
 
     /// Computes the columns of one tile. Columns without light are left out.
-    fn tile(&self, corner: [i64; 2], step: u32, room: &mut TileRoom) -> ColumnSet {
-        let layers = self.part.images.len();
-        let places = sampled(corner, self.side, step);
-        let window = TileWindow { corner, side: self.side, radius: self.blur.radius() };
-        let mut light = vec![0.0_f32; places.len() * layers];
+    fn tile(&self, corner: [i64; 2], room: &mut TileRoom) -> ColumnSet {
+        let (layers, side) = (self.part.images.len(), self.side);
+        let window = TileWindow { corner, side, radius: self.blur.radius() };
+        let mut light = vec![0.0_f32; side * side * layers];
         room.spread_levels.clear();
         for (layer, image) in self.part.images.iter().enumerate() {
             self.spread(image, window, room);
-            for (number, &place) in places.iter().enumerate() {
-                let place = window.place(place);
+            for number in 0..side * side {
+                let place = window.place([number % side, number / side]);
                 let wanted = room.levels[place] >= self.part.wanted();
                 // Zeros carry the sign too, so that voxels without light keep their role.
                 let sign = if wanted { -1.0 } else { 1.0 };
@@ -184,12 +245,75 @@ impl<'a> Gather<'a> {
             }
         }
         let mut columns = ColumnSet::new(layers);
-        for column in light.chunks_exact(layers) {
-            if column.iter().any(|&light| light != 0.0 || light.is_sign_negative()) {
-                columns.add(column, f64::from(step * step));
+        light.chunks_exact(layers).for_each(|column| columns.add_lit(column, 1.0));
+        columns
+    }
+}
+
+/// The squares of an image. A square whose pixels are all alike has their level.
+struct Blocks {
+    side: i64,
+    across: usize,
+    levels: Vec<Option<u8>>,
+}
+
+impl Blocks {
+    /// Divides an image into squares that are not smaller than the distance to which light spreads.
+    fn of(image: &Image, reach: usize) -> Self {
+        let side = reach.next_power_of_two().max(16);
+        let across = (image.width() as usize).div_ceil(side);
+        let area = (side * side) as i64;
+        let mut levels = Vec::new();
+        // Sums over a square of levels and of their squares: of runs that end in it, and, of runs that
+        // pass through it, the change from the square before.
+        let mut ends = vec![[0_i64; 2]; across];
+        let mut passing = vec![[0_i64; 2]; across + 1];
+        let add = |sum: &mut [i64; 2], pixels: i64, level: i64| {
+            *sum = [sum[0] + pixels * level, sum[1] + pixels * level * level];
+        };
+        for first in (0..image.height()).step_by(side) {
+            ends.fill([0; 2]);
+            passing.fill([0; 2]);
+            for row in first..(first + side as u32).min(image.height()) {
+                for (from, to, level) in image.runs(row) {
+                    let level = i64::from(level);
+                    let [start, last] = [from as usize / side, (to as usize - 1) / side];
+                    if start == last {
+                        add(&mut ends[start], i64::from(to - from), level);
+                        continue;
+                    }
+                    add(&mut ends[start], ((start + 1) * side) as i64 - i64::from(from), level);
+                    add(&mut ends[last], i64::from(to) - (last * side) as i64, level);
+                    add(&mut passing[start + 1], side as i64, level);
+                    add(&mut passing[last], -(side as i64), level);
+                }
+            }
+            let mut through = [0_i64; 2];
+            for (end, change) in ends.iter().zip(&passing) {
+                through = [through[0] + change[0], through[1] + change[1]];
+                let sum = [through[0] + end[0], through[1] + end[1]];
+                // The square of a sum is as large as the sum of squares allows only if all are
+                // equal (Cauchy and Schwarz).
+                let is_one = sum[0] * sum[0] == area * sum[1];
+                levels.push(is_one.then_some((sum[0] / area) as u8));
             }
         }
-        columns
+        Self { side: side as i64, across, levels }
+    }
+
+    /// Returns the level of all pixels within a distance, if there is only one. Pixels outside the
+    /// image are black.
+    fn level_around(&self, [column, row]: [i64; 2], reach: i64) -> Option<u8> {
+        let range =
+            |at: i64| (at - reach).div_euclid(self.side)..=(at + reach).div_euclid(self.side);
+        let down = (self.levels.len() / self.across.max(1)) as i64;
+        let level = |[column, row]: [i64; 2]| {
+            let inside = (0..self.across as i64).contains(&column) && (0..down).contains(&row);
+            if inside { self.levels[row as usize * self.across + column as usize] } else { Some(0) }
+        };
+        let mut all = range(row).flat_map(|row| range(column).map(move |column| [column, row]));
+        let first = level(all.next()?)?;
+        all.all(|block| level(block) == Some(first)).then_some(first)
     }
 }
 
@@ -216,21 +340,23 @@ impl TileWindow {
     }
 }
 
-/// Returns the sampled places in a tile: one of each `step` x `step` pixels.
-fn sampled(corner: [i64; 2], side: usize, step: u32) -> Vec<[usize; 2]> {
-    let step = step as usize;
-    let squares = || (0..side).step_by(step);
-    let place = |column: usize, row: usize| {
+/// Returns the sampled pixels of a tile: one of each `step` x `step` square, at a place that differs
+/// from square to square.
+fn sampled(corner: [i64; 2], side: usize, step: u32) -> impl Iterator<Item = [i64; 2]> {
+    let step = u64::from(step);
+    let squares = move || (0..side as i64).step_by(step as usize);
+    let place = move |column: i64, row: i64| {
         // Places must not repeat in step with the part's features: a hash of the square's
         // coordinates chooses.
-        let [x, y] = [corner[0] + column as i64, corner[1] + row as i64].map(|at| at as u64);
+        let [x, y] = [corner[0] + column, corner[1] + row].map(|at| at as u64);
         let mut mix = x.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ y.wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
         mix = (mix ^ (mix >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         mix ^= mix >> 32;
-        let [right, down] = [mix % step as u64, (mix >> 20) % step as u64].map(|at| at as usize);
-        [(column + right).min(side - 1), (row + down).min(side - 1)]
+        let moved = [mix % step, (mix >> 20) % step].map(|at| at as i64);
+        let last = side as i64 - 1;
+        [corner[0] + (column + moved[0]).min(last), corner[1] + (row + moved[1]).min(last)]
     };
-    squares().flat_map(|row| squares().map(move |column| place(column, row))).collect()
+    squares().flat_map(move |row| squares().map(move |column| place(column, row)))
 }
 
 #[cfg(test)]
@@ -279,6 +405,43 @@ mod tests {
                     let exact = light(&part, layer, pixel.map(i64::from), 200.0);
                     let off = (f64::from(lights[layer]) - exact).abs();
                     assert!(off < 1e-4, "{pitch} {pixel:?} {layer}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_alone_have_the_light_of_their_tiles() {
+        let mut part = part(&cavity_staircase(4));
+        // Gray levels, and squares of 16 pixels that have one level but not white.
+        let mut gray = lamp_stack::GrayMask::new(part.size()[0]);
+        for row in 0..part.size()[1] {
+            let level = if row < 80 { 77 } else { (row % 200) as u8 + 30 };
+            gray.push_runs([(3, level), (60, 200), (100, level)]).unwrap();
+        }
+        part.images[2] = Image::Gray(gray);
+        for sigma_um in [0.0, 30.0, 200.0] {
+            let gather = Gather::new(&part, &pegda(sigma_um));
+            let [width, height] = part.size().map(i64::from);
+            let pixels: Vec<_> = (-9..height + 9)
+                .step_by(7)
+                .flat_map(|row| (-9..width + 9).step_by(5).map(move |column| [column, row]))
+                .collect();
+            let light = gather.light_of_pixels(&pixels);
+            let room = &mut TileRoom::default();
+            for (number, &corner) in pixels.iter().enumerate() {
+                let window = TileWindow { corner, side: 1, radius: gather.blur.radius() };
+                for layer in [0, 2, 100, 239] {
+                    gather.spread(&part.images[layer], window, room);
+                    let place = window.place([0, 0]);
+                    let wanted = room.levels[place] >= part.wanted();
+                    let expected = room.spread[place] * if wanted { -1.0 } else { 1.0 };
+                    let found = light[layer][number];
+                    assert!(
+                        (found - expected).abs() < 1e-5,
+                        "{corner:?} {layer} {found} {expected}"
+                    );
+                    assert_eq!(found.is_sign_negative(), wanted, "{corner:?} {layer}");
                 }
             }
         }

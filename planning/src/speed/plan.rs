@@ -12,7 +12,7 @@ use crate::light::Light;
 use crate::numeric::{DescentEnd, descend};
 
 /// Changes when the same options and layers give other times.
-pub const SPEED_CODE: u32 = 1;
+pub const SPEED_CODE: u32 = 2;
 
 /// The light, platform and limits to plan for.
 #[derive(Clone, Copy, Debug, PartialEq)]

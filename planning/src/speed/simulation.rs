@@ -71,7 +71,7 @@ impl<'a> Simulation<'a> {
             return of(&self.columns);
         }
         let mut sums = times.map(|_| Tally::none(self.layers.len()));
-        for tallies in self.gather.tiles(1, |set| of(&set.finish())) {
+        for tallies in self.gather.tiles(|set| of(&set.finish())) {
             sums.iter_mut().zip(&tallies).for_each(|(sum, tally)| sum.add(tally));
         }
         sums
