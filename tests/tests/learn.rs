@@ -40,7 +40,7 @@ fn a_job_keeps_every_print() {
     let line = "lamp learn job/ --measured a.csv --law single --gain 2e-6 -o next.csv \
                 --report learn.json --plot learn.svg";
     let said = String::from_utf8(scratch.run(line).succeeds().stdout).unwrap();
-    assert!(said.contains("errors of prints 0 to 0: 4000 pixels"), "{said}");
+    assert!(said.contains("errors of prints 0 to 0: 4,000 pixels"), "{said}");
     let next = times(&scratch, "next.csv");
     assert_eq!(next, times(&scratch, "job/print-001.csv"));
     for (layer, (next, was)) in next.iter().zip(&planned).enumerate() {
@@ -70,8 +70,8 @@ fn a_job_keeps_every_print() {
     scratch.run("lamp learn job/ --measured b.csv --print 1 -o last.csv").succeeds();
     let last = times(&scratch, "last.csv");
     assert!(last.iter().sum::<f64>() < next.iter().sum());
-    for law in ["multi", "model"] {
-        let line = format!("lamp learn job/ --measured c.csv --law {law} -o last.csv");
+    for law in ["--law multi", ""] {
+        let line = format!("lamp learn job/ --measured c.csv {law} -o last.csv");
         scratch.write("c.csv", format!("# {law}\n{}", areas(|_| 20, |layer| layer)).as_bytes());
         scratch.run(&line).succeeds();
     }
@@ -94,15 +94,38 @@ fn heights_that_are_too_low_shorten_times() {
     let heights = "x_mm,y_mm,z_mm,measured_mm,sd_um\n\
                    2.05,0.75,1.5,1.0,20\n3.05,0.75,3.0,2.5,20\n4.05,0.75,4.5,4.0,\n2.05,1.55,5.2,4.7,20\n";
     scratch.write("heights.csv", heights.as_bytes());
-    let said =
-        scratch.run("lamp learn job/ --measured heights.csv -o next.csv --plot h.svg").succeeds();
-    let said = String::from_utf8(said.stdout).unwrap();
+    let line =
+        "lamp learn job/ --measured heights.csv -o next.csv --plot h.svg --report learn.json";
+    let said = String::from_utf8(scratch.run(line).succeeds().stdout).unwrap();
     assert!(said.contains("errors of prints 0 to 0: 500 um"), "{said}");
+    assert!(said.contains("times the material's; before this print 1.00 ("), "{said}");
     let [was, next] = ["job/print-000.csv", "next.csv"].map(|name| times(&scratch, name));
     assert!(next.iter().sum::<f64>() < 0.95 * was.iter().sum::<f64>());
-    assert!(scratch.names().contains(&"h.svg".to_owned()));
-    let doses = String::from_utf8(scratch.bytes("job/print-001-doses.csv")).unwrap();
-    assert!(doses.starts_with("layer,log_dose\n") && doses.lines().count() == 62);
+    let plot = String::from_utf8(scratch.bytes("h.svg")).unwrap();
+    assert!(plot.contains("Light and resin that each print was planned for"), "{plot}");
+    let report: Value = serde_json::from_slice(&scratch.bytes("learn.json")).unwrap();
+    let state = report["state"].as_array().unwrap();
+    let of = |number: usize, key: &str| state[number][key].as_f64().unwrap();
+    // Faces that are cured too deep got more light, or light that reaches deeper.
+    assert!(state.len() == 3 && of(0, "value") * of(1, "value") > 1.1, "{state:?}");
+    let width = |key: &str| {
+        let ends = state[0][key].as_array().unwrap();
+        (ends[1].as_f64().unwrap() / ends[0].as_f64().unwrap()).ln()
+    };
+    assert!(width("interval") < width("interval_before"), "{state:?}");
+    assert_eq!(report["by_layer"].as_array().unwrap().len(), 60);
+    let kept = String::from_utf8(scratch.bytes("job/print-001-state.toml")).unwrap();
+    assert!(kept.contains("[penetration-depth]"), "{kept}");
+    // A law is of wrong pixels.
+    scratch.write("more.csv", heights.replace("1.0,20", "1.1,20").as_bytes());
+    scratch
+        .run("lamp learn job/ --measured more.csv --law single -o law.csv")
+        .is_refused_with(&["heights teach the state of light and resin"]);
+    // A state that was changed is no longer what was learned.
+    scratch.write("job/print-001-state.toml", kept.replace("0.", "1.").as_bytes());
+    scratch
+        .run("lamp learn job/ --measured more.csv -o law.csv")
+        .is_refused_with(&["print-001-state.toml differs from the file that lamp learn wrote"]);
 }
 
 #[test]
@@ -127,6 +150,11 @@ fn what_teaches_nothing_is_refused_and_changes_nothing() {
         ("layer,over_px,under_px\n7,,0\n", "line 2, column over_px: `` is not a number"),
         ("layer,over_px,under_px\n7,-1,0\n", "line 2: a number of wrong pixels must be 0 or more"),
         ("layer,over_px,under_px\n7.5,1,0\n", "line 2, column layer: 7.5 is not a layer"),
+        (
+            "layer,over_px,under_px\n7,1e11,0\n",
+            "line 2, column over_px: 100000000000 pixels are more than the",
+        ),
+        ("layer,over_px,under_px\n7,0,9999\n", "line 2, column under_px: 9999 pixels are more"),
         ("layer,over_px,under_px\n", "there are no measurements below the header"),
         ("layer,over_px\n1,2\n", "there is no column under_px"),
         ("", "the file is empty"),

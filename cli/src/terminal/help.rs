@@ -100,18 +100,7 @@ const USUAL: [(&str, &[&str]); 14] = [
     ),
     (
         "learn",
-        &[
-            "start",
-            "material",
-            "measured",
-            "print",
-            "law",
-            "gain",
-            "correction",
-            "report",
-            "plot",
-            "output",
-        ],
+        &["start", "material", "measured", "print", "law", "gain", "report", "plot", "output"],
     ),
     (
         "compensate",

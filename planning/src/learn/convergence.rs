@@ -2,8 +2,7 @@
 //!
 //! If the times change by `L e`, the errors `e` become `(I - G L) e`. The spectral radius of that
 //! matrix gives their long-run decay; its 2-norm shows whether they may grow first. Errors are
-//! counted in voxels; for the model's step, they are counted in shares of its noise, in which units
-//! the step minimizes them.
+//! counted in voxels.
 
 use super::law::Law;
 use super::response::Response;
@@ -32,31 +31,26 @@ const NORM_ROUNDS: usize = 200;
 /// The number of times that it is applied before, and during, the measurement of the radius.
 const RADIUS_ROUNDS: [usize; 2] = [400, 400];
 
-/// Returns the decay of a law's errors where the model says `assumed` and `real` is true. The law
-/// of several layers depends on the signs of the present `errors`.
-pub fn convergence(
-    law: &Law,
-    times: &[f64],
-    errors: &[f64],
-    [assumed, real]: [&Response; 2],
-) -> Convergence {
-    let shrink = Shrink::new(law, times, errors, [assumed, real]);
+/// Returns the decay of a law's errors under a response. The law of several layers depends on the
+/// signs of the present `errors`.
+pub fn convergence(law: &Law, errors: &[f64], response: &Response) -> Convergence {
+    let shrink = Shrink::new(law, errors, response);
     let radius = match law {
         // The matrix is triangular: its eigenvalues are on its diagonal.
         Law::Single { gain } => {
             // A layer's time changes its own layer and those below, never one above.
-            let own = real.per_second().into_iter().map(|voxels| (1.0 - gain * voxels).abs());
+            let own = response.per_second().into_iter().map(|voxels| (1.0 - gain * voxels).abs());
             own.fold(0.0, f64::max)
         }
-        _ => shrink.radius(),
+        Law::Multi(_) => shrink.radius(),
     };
     Convergence { radius, norm: shrink.norm(1.0) }
 }
 
 /// Returns the factor by which a law's gains may be multiplied before errors may grow, up to a
 /// thousand. It is zero if any gain lets them grow.
-pub fn largest_safe_gain(law: &Law, times: &[f64], errors: &[f64], response: &Response) -> f64 {
-    let shrink = Shrink::new(law, times, errors, [response, response]);
+pub fn largest_safe_gain(law: &Law, errors: &[f64], response: &Response) -> f64 {
+    let shrink = Shrink::new(law, errors, response);
     let safe = |gain: f64| shrink.norm(gain) <= 1.0 + 1e-6;
     // The norm is a convex function of the gain, and 1 at zero.
     let (mut low, mut high) = (0.0, 1e3);
@@ -84,19 +78,15 @@ struct Shrink {
 }
 
 impl Shrink {
-    fn new(law: &Law, times: &[f64], errors: &[f64], [assumed, real]: [&Response; 2]) -> Self {
-        let size = times.len();
-        let noise = match law {
-            Law::Model(law) => law.noise_of(assumed),
-            _ => vec![1.0; size],
-        };
+    fn new(law: &Law, errors: &[f64], response: &Response) -> Self {
+        let size = errors.len();
         let mut rows = vec![0.0; size * size];
         for column in 0..size {
             let mut unit = vec![0.0; size];
-            unit[column] = noise[column];
-            let cured = real.apply(&law.linear(times, &unit, errors, assumed));
+            unit[column] = 1.0;
+            let cured = response.apply(&law.linear(&unit, errors));
             for (row, cured) in cured.into_iter().enumerate() {
-                rows[row * size + column] = cured / noise[row];
+                rows[row * size + column] = cured;
             }
         }
         Self { size, rows }

@@ -220,6 +220,23 @@ pub enum LearnError {
         /// The highest layer.
         last: u32,
     },
+    /// A layer cannot have so many wrong pixels.
+    #[error(
+        "line {line}, column {column}: {count} pixels are more than the {most} that there can be"
+    )]
+    TooMany {
+        /// The line of the table, from 1.
+        line: usize,
+        /// The column.
+        column: &'static str,
+        /// The pixels that were given.
+        count: f64,
+        /// The most that there can be.
+        most: f64,
+    },
+    /// A law is for wrong pixels.
+    #[error("heights teach the state of light and resin: --law is for wrong pixels")]
+    LawOfHeights,
     /// The stack's pages do not state their position on the part.
     #[error("the stack's pages do not state their position on the part")]
     NoPosition,

@@ -6,7 +6,7 @@
 //! material.toml           its resin
 //! print-000.csv           the times of the first print
 //! print-000-measured.csv  what was measured on it
-//! print-001-doses.csv     by what measured heights correct the doses
+//! print-001-state.toml    the state of light and resin that the next print is planned for
 //! print-001.csv           the times of the next
 //! ```
 
@@ -23,7 +23,8 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{JobError, JobFileError};
 use super::measured::PrintMeasurements;
-use super::step::Learned;
+use super::state::LightState;
+use super::step::{Learned, Lesson};
 use crate::light::{Light, SampleHeight};
 use crate::speed::{PartPages, Platform, TimedLayer, TimedPart, times_table};
 
@@ -32,7 +33,6 @@ const MAX_FILE: u64 = 1 << 20;
 /// Tables of times have a line for each layer.
 const MAX_TABLE: u64 = 64 << 20;
 const PROFILE: [&str; 5] = ["layer", "z_um", "thickness_um", "exposure_ms", "speed_um_per_s"];
-const DOSES: [&str; 2] = ["layer", "log_dose"];
 
 /// The purpose of a job: its stack, and how to plan its prints.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -67,8 +67,8 @@ pub struct JobPrint {
     pub times: Vec<f64>,
     /// The measurements, and their text.
     pub measured: Option<(PrintMeasurements, String)>,
-    /// The corrections of doses that heights gave before, from the light on.
-    pub log_doses: Vec<f64>,
+    /// The state of light and resin that it was planned for, if prints had shown one.
+    pub state: Option<LightState>,
 }
 
 /// A job that is open.
@@ -78,8 +78,8 @@ pub struct Job {
     file: JobFile,
     /// The stack as the model sees it.
     pub part: TimedPart,
-    /// The name of the material.
-    pub material: String,
+    /// The resin at the start.
+    pub material: Material,
     /// The model of light and resin.
     pub light: Light,
     /// All prints, the last of which is to be measured.
@@ -181,7 +181,6 @@ impl Job {
             pages.push(layer?).map_err(|error| at(&stack)(error.into()))?;
         }
         let part = pages.finish().map_err(JobError::from)?;
-        let material = material.name;
         let mut job =
             Self { folder: folder.to_owned(), file, part, material, light, prints: Vec::new() };
         while job.folder.join(profile_name(job.prints.len())).exists() {
@@ -195,14 +194,38 @@ impl Job {
         Ok(job)
     }
 
+    /// Returns a job that is not in a folder.
+    #[cfg(test)]
+    pub(super) fn of_part(
+        part: TimedPart,
+        light: Light,
+        material: Material,
+        platform: &Platform,
+        times: Vec<f64>,
+    ) -> Self {
+        let file = JobFile {
+            part: "a test".to_owned(),
+            digest: String::new(),
+            origin_mm: Some([0.0; 2]),
+            wanted: 128,
+            at: light.at,
+            margin: 0.05,
+            slowest_um_per_s: platform.slowest,
+            fastest_um_per_s: platform.fastest,
+            max_change: platform.max_change,
+        };
+        let prints = vec![JobPrint { times, measured: None, state: None }];
+        Self { folder: PathBuf::new(), file, part, material, light, prints }
+    }
+
     fn read_print(&self, number: usize) -> Result<JobPrint, JobError> {
         let times = self.read_column(&profile_name(number), &PROFILE, 3)?;
-        let doses = doses_name(number);
-        let log_doses = if self.folder.join(&doses).exists() {
-            self.read_column(&doses, &DOSES, 1)?
-        } else {
-            vec![0.0; times.len()]
+        let state = self.folder.join(state_name(number));
+        let read_state = || -> Result<_, JobFileError> {
+            let text = read_sealed(&state, MAX_TABLE, "a state of light and resin")?;
+            Ok(toml::from_str::<LightState>(&text)?)
         };
+        let planned_for = state.exists().then(read_state).transpose().map_err(at(&state))?;
         let measured = self.folder.join(measured_name(number));
         // Without a next print, the measurements were kept by a run that did not end.
         let next = self.folder.join(profile_name(number + 1));
@@ -218,7 +241,7 @@ impl Job {
         Ok(JobPrint {
             times: times.iter().map(|ms| ms / 1000.0).collect(),
             measured: measured_and_text,
-            log_doses,
+            state: planned_for,
         })
     }
 
@@ -285,20 +308,15 @@ impl Job {
     ) -> Vec<(PathBuf, String)> {
         let file = |name: String, text: &str| (self.folder.join(name), sealed(text));
         let mut files = Vec::new();
-        if learned.log_doses.iter().any(|&log| log != 0.0) {
-            files.push(file(doses_name(print + 1), &self.doses(learned)));
+        if let Lesson::State(lesson) = &learned.lesson {
+            let text = toml::to_string(&lesson.after).expect("numbers are TOML");
+            files.push(file(state_name(print + 1), &text));
         }
         let end = if text.ends_with('\n') { "" } else { "\n" };
         files.push(file(measured_name(print), &format!("{text}{end}")));
         // The print exists once its times do.
         files.push(file(profile_name(print + 1), &self.profile(&learned.times)));
         files
-    }
-
-    fn doses(&self, learned: &Learned) -> String {
-        let layers = self.part.layers().iter().zip(&learned.log_doses).rev();
-        let lines = layers.map(|(layer, log_dose)| format!("{},{log_dose}\n", layer.index));
-        format!("{}\n{}", DOSES.join(","), lines.collect::<String>())
     }
 
     /// Goes back to the state before the last print was learned from, if these are its
@@ -368,8 +386,8 @@ fn measured_name(print: usize) -> String {
     format!("print-{print:03}-measured.csv")
 }
 
-fn doses_name(print: usize) -> String {
-    format!("print-{print:03}-doses.csv")
+fn state_name(print: usize) -> String {
+    format!("print-{print:03}-state.toml")
 }
 
 #[cfg(test)]

@@ -1,7 +1,5 @@
 //! The laws that change times by the errors of a print (004 section 3.1).
 
-use super::least_squares::bounded_step;
-use super::response::Response;
 use crate::speed::Wrong;
 
 /// No time is shorter, in seconds (004 listing A.6).
@@ -18,8 +16,6 @@ pub enum Law {
     /// 004 eq. 3.6 to 3.8: by the mean error of the layers around, and by the errors of the
     /// layers below, whose doses it adds to.
     Multi(MultiLaw),
-    /// The step that the model says is best.
-    Model(ModelLaw),
 }
 
 /// The numbers of 004 eq. 3.6 to 3.8, as listing A.6 has them.
@@ -41,19 +37,6 @@ pub struct MultiLaw {
     pub reach_gain: f64,
 }
 
-/// The weights of the model's step: least |(e - G dt) / noise|² + ρ |dt / t|².
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ModelLaw {
-    /// The exactness of errors: the number of voxels that such a change of all doses cures, as a
-    /// logarithm, and at least one voxel.
-    pub noise: f64,
-    /// The weight of changes, `ρ`.
-    pub stiffness: f64,
-    /// No time changes by a larger share of itself, since the response is valid only near the
-    /// present times.
-    pub most_change: f64,
-}
-
 impl Law {
     /// The gain of eq. 3.5 in 004's prints, in seconds per pixel of 10 um.
     pub const GAIN: f64 = 6e-6;
@@ -65,36 +48,11 @@ impl Law {
         Self::Multi(MultiLaw { gain, mean_of: 10, reach: 350, reach_gain })
     }
 
-    /// Returns the model's step.
-    pub fn model() -> Self {
-        Self::Model(ModelLaw { noise: 0.05, stiffness: 1.0, most_change: 0.5 })
-    }
-
     /// Returns the next times, in seconds, from the errors of a print with the present ones. An
     /// error is the number of voxels that should have been cured minus the number that should not,
     /// for each layer from the light on. `low` and `high` bound the times.
-    pub fn next(
-        &self,
-        times: &[f64],
-        errors: &[f64],
-        response: &Response,
-        [low, high]: [&[f64]; 2],
-    ) -> Vec<f64> {
-        let changes = match self {
-            Self::Model(law) => {
-                // The response is a slope at the present times, and holds only near them.
-                let within = |k: usize, share: f64| times[k] * share;
-                let low: Vec<_> = (0..times.len())
-                    .map(|k| low[k].max(within(k, 1.0 - law.most_change)) - times[k])
-                    .collect();
-                let high: Vec<_> = (0..times.len())
-                    .map(|k| high[k].min(within(k, 1.0 + law.most_change)) - times[k])
-                    .collect();
-                let problem = law.weights(times, response);
-                bounded_step(response, errors, &problem, [&low, &high])
-            }
-            _ => self.linear(times, errors, errors, response),
-        };
+    pub fn next(&self, times: &[f64], errors: &[f64], [low, high]: [&[f64]; 2]) -> Vec<f64> {
+        let changes = self.linear(errors, errors);
         let bounds = low.iter().zip(high);
         let next = times.iter().zip(changes).zip(bounds);
         next.map(|((time, change), (low, high))| {
@@ -105,17 +63,17 @@ impl Law {
 
     /// Returns the changes of times that errors cause, without bounds; they are linear in `errors`.
     /// Where `signs` are negative, too much is cured.
-    pub fn linear(
-        &self,
-        times: &[f64],
-        errors: &[f64],
-        signs: &[f64],
-        response: &Response,
-    ) -> Vec<f64> {
+    pub fn linear(&self, errors: &[f64], signs: &[f64]) -> Vec<f64> {
         match self {
             Self::Single { gain } => errors.iter().map(|error| gain * error).collect(),
             Self::Multi(law) => law.changes(errors, signs),
-            Self::Model(law) => law.weights(times, response).solve(response, errors),
+        }
+    }
+
+    /// Returns the gain, in seconds a pixel.
+    pub fn gain(&self) -> f64 {
+        match self {
+            Self::Single { gain } | Self::Multi(MultiLaw { gain, .. }) => *gain,
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Reads the measurements of a print.
 
+use std::collections::BTreeSet;
+
 use lamp_grayscale::calibrate::{CsvTable, NumberRow};
 
 use super::error::MeasuredError;
@@ -46,7 +48,58 @@ pub struct AreaRow {
     pub under: f64,
 }
 
+/// The error of a print.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PrintError {
+    /// Wrong pixels of all layers.
+    Pixels(f64),
+    /// Root mean square by which heights are off, in micrometers.
+    Micrometers(f64),
+}
+
+impl PrintError {
+    /// Returns the number.
+    pub fn number(self) -> f64 {
+        let (Self::Pixels(number) | Self::Micrometers(number)) = self;
+        number
+    }
+}
+
 impl PrintMeasurements {
+    /// Returns whether the error of another print means the same: both are of the same layers, or of heights
+    /// at the same places.
+    pub fn is_comparable(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Areas(own), Self::Areas(other)) => {
+                let layers = |rows: &[AreaRow]| -> BTreeSet<u32> {
+                    rows.iter().map(|row| row.layer).collect()
+                };
+                layers(own) == layers(other)
+            }
+            (Self::Heights(own), Self::Heights(other)) => {
+                let is_in = |row: &HeightRow, all: &[HeightRow]| {
+                    all.iter().any(|it| it.place_mm == row.place_mm && it.z_mm == row.z_mm)
+                };
+                own.len() == other.len() && own.iter().all(|row| is_in(row, other))
+            }
+            _ => false,
+        }
+    }
+
+    /// Returns the error of the print.
+    pub fn error(&self) -> PrintError {
+        match self {
+            Self::Areas(rows) => {
+                PrintError::Pixels(rows.iter().map(|row| row.over + row.under).sum())
+            }
+            Self::Heights(rows) => {
+                let square = |row: &HeightRow| (1000.0 * (row.measured_mm - row.z_mm)).powi(2);
+                let squares: f64 = rows.iter().map(square).sum();
+                PrintError::Micrometers((squares / rows.len() as f64).sqrt())
+            }
+        }
+    }
+
     /// Reads a table: of heights, or of areas if it has the column `layer`.
     ///
     /// # Errors

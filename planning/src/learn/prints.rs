@@ -1,12 +1,14 @@
 //! The prints of 004 chapter 3, simulated: its numbers, and the course of the errors.
 
 use lamp_fixtures::{Voxels, cavity_staircase, narrow_cross, square_prism};
-use lamp_stack::Length;
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::Intensity;
+use lamp_stack::{Catalogued, Length};
 
 use super::*;
 use crate::light::Light;
-use crate::speed::testing::{options, part, pegda, plant};
-use crate::speed::{Simulation, plan_corrected};
+use crate::speed::testing::{part, pegda};
+use crate::speed::{Platform, Simulation, SpeedOptions, Tally, plan};
 
 const LAYERS: usize = 50;
 /// Bounds that only the shortest time of 004 limits.
@@ -21,21 +23,14 @@ fn prism_times(dose: f64, light: &Light, at_once: bool) -> [f64; LAYERS] {
 }
 
 /// Prints repeatedly, and returns the wrong voxels of each print.
-fn prints(
-    plant: &Simulation<'_>,
-    model: &Simulation<'_>,
-    law: Law,
-    start: &[f64],
-    count: usize,
-) -> Vec<u64> {
+fn prints(plant: &Simulation<'_>, law: Law, start: &[f64], count: usize) -> Vec<u64> {
     let mut times = start.to_vec();
     let mut wrong = Vec::new();
     for _ in 0..count {
         let [print] = plant.tally([&times]);
         wrong.push(print.wrong().sum());
-        let response = Response::of(model, &times);
         let bounds = [&FREE[0][..], &FREE[1][..]];
-        times = law.next(&times, &errors_of(&print.layers), &response, bounds);
+        times = law.next(&times, &errors_of(&print.layers), bounds);
     }
     wrong
 }
@@ -64,7 +59,7 @@ fn prints_of_004(voxels: &Voxels, blur_um: f64, gain: f64, count: usize) -> Vec<
     let (part, light) = (part(voxels), pegda(blur_um));
     let simulation = Simulation::new(&part, &light, 1 << 30).unwrap();
     let start = prism_times(4.0, &light, false);
-    prints(&simulation, &simulation, Law::Single { gain }, &start, count)
+    prints(&simulation, Law::Single { gain }, &start, count)
 }
 
 #[test]
@@ -88,17 +83,17 @@ fn a_gain_that_is_too_large_is_told_before_it_does_harm() {
     let best = prism_times(2.0, &light, true);
     let errors = [1.0; LAYERS];
     let response = Response::of(&simulation, &best);
-    let of = |gain| convergence(&Law::Single { gain }, &best, &errors, [&response; 2]);
+    let of = |gain| convergence(&Law::Single { gain }, &errors, &response);
     let (small, large) = (of(Law::GAIN), of(4e-5));
     assert_eq!(format!("{:.2}", small.norm), "0.96");
     assert!((large.radius - 0.47).abs() < 0.01 && (large.norm - 2.9).abs() < 0.1, "{large:?}");
     assert!(large.may_grow() && !small.may_grow());
-    let safe =
-        Law::GAIN * largest_safe_gain(&Law::Single { gain: Law::GAIN }, &best, &errors, &response);
+    let law = Law::Single { gain: Law::GAIN };
+    let safe = law.gain() * largest_safe_gain(&law, &errors, &response);
     assert!(!of(safe).may_grow() && of(1.01 * safe).may_grow(), "{safe}");
     // Errors rise sixfold.
     let start = prism_times(4.0, &light, false);
-    let wrong = prints(&simulation, &simulation, Law::Single { gain: 4e-5 }, &start, 2);
+    let wrong = prints(&simulation, Law::Single { gain: 4e-5 }, &start, 2);
     let rise = wrong[1] as f64 / wrong[0] as f64;
     assert!((5.5..6.5).contains(&rise), "{rise}");
 }
@@ -113,18 +108,6 @@ fn the_best_times_of_a_prism_are_those_of_twice_the_critical_dose() {
     assert!(simulation.field_doses(&times).iter().all(|dose| (dose - 2.0).abs() < 1e-9));
 }
 
-#[test]
-fn the_model_learns_a_plant_in_three_prints() {
-    let (part, light) = (part(&square_prism(0)), pegda(100.0));
-    let model = Simulation::new(&part, &light, 1 << 30).unwrap();
-    let real = Simulation::new(&part, &plant(&light), 1 << 30).unwrap();
-    let start = model.times_for(2.0);
-    let wrong = |law| prints(&real, &model, law, &start, 4);
-    let (single, best) = (wrong(Law::Single { gain: Law::GAIN }), wrong(Law::model()));
-    assert!(10 * best[2] <= best[0] && 10 * best[3] <= best[0], "{best:?}");
-    assert!(single[2] > 4 * best[2]);
-}
-
 /// Normal deviates, the same in every run.
 fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
@@ -137,39 +120,213 @@ fn noise(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
+/// How far a plant's light and resin are from the model, and by how much its dose drifts a print.
+#[derive(Clone, Copy, Debug)]
+struct Plant {
+    depth: f64,
+    dose: f64,
+    spread: f64,
+    drift: f64,
+}
+
+impl Plant {
+    fn light(self, model: &Light, print: usize) -> Light {
+        let dose = self.dose * (1.0 + self.drift).powi(print as i32);
+        Light {
+            intensity: Intensity::from_mw_per_cm2(dose * model.intensity.mw_per_cm2()),
+            penetration_depth: Length::from_um(self.depth * model.penetration_depth.um()),
+            spread: model.spread.map(|sigma| Length::from_um(self.spread * sigma.um())),
+            ..*model
+        }
+    }
+}
+
+const PLATFORM: Platform = Platform { slowest: 5.0, fastest: 2000.0, max_change: None };
+
+/// Returns the counts of each print of a plant, learned from what is measured of it.
+fn learned_prints(
+    voxels: &Voxels,
+    model: Light,
+    real: Plant,
+    start: &[f64],
+    count: usize,
+    mut measure: impl FnMut(&Job, &Simulation<'_>, &Light, &Tally) -> PrintMeasurements,
+) -> Vec<Tally> {
+    let material = Material::builtin("pegda-sudan").unwrap();
+    let mut job = Job::of_part(part(voxels), model, material, &PLATFORM, start.to_vec());
+    let mut prints = Vec::new();
+    for number in 0..count {
+        let of_plant = real.light(&model, number);
+        let simulation = Simulation::new(&job.part, &of_plant, 1 << 30).unwrap();
+        let [print] = simulation.tally([&job.prints[number].times]);
+        let measured = measure(&job, &simulation, &of_plant, &print);
+        prints.push(print);
+        if prints.len() < count {
+            let learned = learn(&job, number, &measured, Method::State, 1 << 30).unwrap();
+            let Lesson::State(lesson) = learned.lesson else { panic!("a state is learned") };
+            job.prints[number].measured = Some((measured, String::new()));
+            let (times, state) = (learned.times, Some(lesson.after));
+            job.prints.push(JobPrint { times, measured: None, state });
+        }
+    }
+    prints
+}
+
+/// Returns the counts of a print as a person measures them, 2 % off.
+fn counted(job: &Job, print: &Tally, noise: &mut impl FnMut() -> f64) -> PrintMeasurements {
+    let mut noisy = |count: u64| (count as f64 * (1.0 + 0.02 * noise())).round().max(0.0);
+    let rows = print.layers.iter().enumerate().map(|(at, layer)| AreaRow {
+        line: at + 2,
+        layer: job.part.layers()[at].index,
+        over: noisy(layer.over),
+        under: noisy(layer.under).min(print.wanted[at] as f64),
+    });
+    PrintMeasurements::Areas(rows.collect())
+}
+
+/// The times of `lamp plan speed`.
+fn planned(voxels: &Voxels, light: Light) -> Vec<f64> {
+    let options =
+        SpeedOptions { light, platform: PLATFORM, margin: 0.05, gap: 0.01, memory: 1 << 30 };
+    let plan = plan(&part(voxels), &options).unwrap();
+    plan.times.iter().map(|time| time.ms() / 1000.0).collect()
+}
+
+/// Light 10 % brighter, reaching 25 % deeper, and a critical dose 15 % lower.
+const OFF: Plant = Plant { depth: 1.25, dose: 1.1 / 0.85, spread: 1.0, drift: 0.0 };
+
 #[test]
-fn heights_are_learnt_in_six_steps() {
-    let (part, light) = (part(&cavity_staircase(1)), pegda(50.0));
-    let real = Simulation::new(&part, &plant(&light), 1 << 30).unwrap();
-    let options = options(light, None);
+fn the_state_of_a_plant_shows_in_its_first_print() {
+    let (square, light) = (square_prism(0), pegda(100.0));
+    let start = prism_times(4.0, &light, false);
+    let mut deviates = noise(17);
+    let prints = learned_prints(&square, light, OFF, &start, 3, |job, _, _, print| {
+        counted(job, print, &mut deviates)
+    });
+    let wrong = |number: usize| prints[number].wrong().sum();
+    assert!(50 * wrong(1) <= wrong(0) && 50 * wrong(2) <= wrong(0), "{}", wrong(2));
+    // The top layer has only its own light. At first, no pixel of it is cured.
+    assert_eq!(prints[0].layers[0].under, 250_000);
+    assert!(prints[2].layers.iter().all(|layer| layer.under < 1000));
+}
+
+#[test]
+fn a_plan_for_another_plant_is_as_good_as_the_plan_for_it_after_two_prints() {
+    let (square, light) = (square_prism(0), pegda(100.0));
+    let real = Plant { depth: 0.8, dose: 0.85, spread: 1.3, drift: 0.02 };
+    let mut deviates = noise(3);
+    let start = planned(&square, light);
+    let prints = learned_prints(&square, light, real, &start, 3, |job, _, _, print| {
+        counted(job, print, &mut deviates)
+    });
+    let known = real.light(&light, 2);
+    let of_square = part(&square);
+    let simulation = Simulation::new(&of_square, &known, 1 << 30).unwrap();
+    let [best] = simulation.tally([&planned(&square, known)]);
+    let (learned, best) = (prints[2].wrong().sum() as f64, best.wrong().sum() as f64);
+    assert!(learned <= 1.2 * best, "{learned} {best}");
+}
+
+/// Light that spreads over half a pixel: counts have coarse steps.
+#[test]
+fn counts_of_the_model_itself_teach_that_it_is_right() {
+    let (stairs, light) = (cavity_staircase(1), pegda(50.0));
+    let right = Plant { depth: 1.0, dose: 1.0, spread: 1.0, drift: 0.0 };
+    let start = planned(&stairs, light);
+    let prints = learned_prints(&stairs, light, right, &start, 2, |job, _, _, print| {
+        let measured = counted(job, print, &mut || 0.0);
+        let learned = learn(job, 0, &measured, Method::State, 1 << 30).unwrap();
+        let Lesson::State(lesson) = learned.lesson else { panic!("a state is learned") };
+        if job.prints.len() == 1 {
+            assert!(lesson.misfit < 3.0, "{lesson:?}");
+            for factor in lesson.after.factors() {
+                let [low, high] = factor.interval();
+                assert!(low <= 1.0 && 1.0 <= high, "{:?}", lesson.after);
+            }
+        }
+        measured
+    });
+    let wrong = |number: usize| prints[number].wrong().sum() as f64;
+    assert!(wrong(1) <= 1.2 * wrong(0), "{} {}", wrong(0), wrong(1));
+}
+
+#[test]
+fn heights_teach_the_state() {
+    let (stairs, light) = (cavity_staircase(1), pegda(50.0));
     // The undersides of the steps, and the cavity's roof.
     let places = [([20, 7], 1500.0), ([30, 7], 3000.0), ([40, 7], 4500.0), ([20, 15], 5200.0)];
-    let face = |(pixel, z_um)| (pixel, face_at(&part, pixel, Length::from_um(z_um)).unwrap());
-    let faces = places.map(face);
-    let mut learned = LogDoses::none(&part);
-    let mut noise = noise(7);
-    let mut errors = Vec::new();
-    for _ in 0..7 {
-        let plan = plan_corrected(&part, &options, learned.values()).unwrap();
-        let times: Vec<_> = plan.times.iter().map(|time| time.ms() / 1000.0).collect();
-        let model = Simulation::corrected(&part, &light, learned.values(), 1 << 30).unwrap();
-        let expected = heights_of(&part, &model, &light, &times, &faces).unwrap();
-        let found = heights_of(&part, &real, &plant(&light), &times, &faces).unwrap();
-        let deeper: Vec<_> =
-            expected.iter().zip(&found).map(|(model, real)| model.um() - real.um()).collect();
-        let measured =
-            faces.iter().zip(&deeper).map(|(face, um)| (face.1, um + 20.0 * noise(), 20.0));
-        learned.step(&measured.collect::<Vec<_>>(), &light, 0.5);
-        errors.push(deeper);
-        // No layer is lost: most of it is cured.
-        let [print] = real.tally([&times]);
-        let mut layers = print.layers.iter().zip(&print.wanted);
-        assert!(layers.all(|(wrong, &wanted)| 2 * wrong.under < wanted));
+    let mut deviates = noise(7);
+    let mut off = Vec::new();
+    let start = planned(&stairs, light);
+    learned_prints(&stairs, light, OFF, &start, 4, |job, simulation, real, _| {
+        let times = &job.prints.last().unwrap().times;
+        let measure = |(pixel, z_um): ([u32; 2], f64)| {
+            let face = face_at(&job.part, pixel, Length::from_um(z_um)).unwrap();
+            let doses = simulation.doses_at(pixel, times);
+            height_of(&job.part, &doses, real, face).unwrap().um()
+        };
+        let heights = places.map(measure);
+        off.push(std::array::from_fn::<_, 4, _>(|k| heights[k] - places[k].1));
+        let [width, height] = job.part.pitch().mm();
+        let row = |(line, ((pixel, z_um), um)): (usize, (([u32; 2], f64), f64))| HeightRow {
+            line,
+            place_mm: [(f64::from(pixel[0]) + 0.5) * width, -(f64::from(pixel[1]) + 0.5) * height],
+            z_mm: z_um / 1000.0,
+            measured_mm: (um + 20.0 * deviates()) / 1000.0,
+            sd_um: 20.0,
+        };
+        let rows = places.into_iter().zip(heights).enumerate().map(row);
+        PrintMeasurements::Heights(rows.collect())
+    });
+    // Times alone cannot give both walls and undersides: a plan that knows the truth is the measure.
+    let real = OFF.light(&light, 0);
+    let of_stairs = part(&stairs);
+    let simulation = Simulation::new(&of_stairs, &real, 1 << 30).unwrap();
+    let known = planned(&stairs, real);
+    let best = places.map(|(pixel, z_um)| {
+        let face = face_at(&of_stairs, pixel, Length::from_um(z_um)).unwrap();
+        let doses = simulation.doses_at(pixel, &known);
+        height_of(&of_stairs, &doses, &real, face).unwrap().um() - z_um
+    });
+    let worst = |off: &[f64; 4]| {
+        off.iter().zip(best).fold(0.0, |most: f64, (um, best)| most.max((um - best).abs()))
+    };
+    assert!(worst(&off[0]) > 300.0, "{off:?} {best:?}");
+    // A step keeps a reserve of dose against drift, 4 % or 44 um of depth at most.
+    assert!(worst(&off[2]) < 60.0 && worst(&off[3]) < 60.0, "{off:?} {best:?}");
+}
+
+/// Plants whose penetration depth is up to 30 % off, light and critical dose up to 20 %, spread -30
+/// to +50 %, with a drift of 2 % a print.
+#[test]
+#[ignore = "it prints a table, and takes hours"]
+fn hundreds_of_plants_are_learned_in_three_prints() {
+    let (square, light) = (square_prism(0), pegda(100.0));
+    let starts = [prism_times(4.0, &light, false).to_vec(), planned(&square, light)];
+    let plants: usize = std::env::var("LAMP_PLANTS").map_or(200, |count| count.parse().unwrap());
+    let mut state = 1_u64;
+    let mut uniform = |low: f64, high: f64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for number in 0..plants {
+        let real = Plant {
+            depth: uniform(0.7, 1.3),
+            dose: uniform(0.8, 1.2) / uniform(0.8, 1.2),
+            spread: uniform(0.7, 1.5),
+            drift: if uniform(0.0, 1.0) < 0.5 { 0.02 } else { -0.02 },
+        };
+        for (name, start) in ["4 E_c", "plan speed"].iter().zip(&starts) {
+            let mut deviates = noise(number as u64);
+            let prints = learned_prints(&square, light, real, start, 4, |job, _, _, print| {
+                counted(job, print, &mut deviates)
+            });
+            let wrong: Vec<_> = prints.iter().map(|print| print.wrong().sum()).collect();
+            let known = real.light(&light, 3);
+            let of_square = part(&square);
+            let simulation = Simulation::new(&of_square, &known, 1 << 30).unwrap();
+            let [best] = simulation.tally([&planned(&square, known)]);
+            println!("{number},{name},{real:?},{wrong:?},{}", best.wrong().sum());
+        }
     }
-    let mean = |errors: &[f64]| errors.iter().map(|um| um.abs()).sum::<f64>() / 4.0;
-    assert!(mean(&errors[0]) > 500.0, "{errors:?}");
-    assert!(errors[6].iter().all(|um| um.abs() < 40.0), "{errors:?}");
-    // A step leaves 1 - ω D_true / D_model.
-    let left = mean(&errors[1]) / mean(&errors[0]);
-    assert!((left - (1.0 - 0.5 * 1.25)).abs() < 0.06, "{left}");
 }

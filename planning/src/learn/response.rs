@@ -13,10 +13,7 @@ const RANGE: f64 = 1.3;
 /// `G_kn = s_k q^(k-n)` for n ≤ k, with layers counted from the light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
-    /// The voxels of each layer that cross the critical dose as all doses rise by a factor, per
-    /// logarithm of it.
-    per_log_dose: Vec<f64>,
-    /// The same per unit of dose of a wide white field.
+    /// The voxels of each layer that cross the critical dose, per unit of dose of a wide white field.
     per_dose: Vec<f64>,
     /// The share that passes from the layer above, and the dose of a second.
     layers: Vec<LayerLight>,
@@ -35,13 +32,11 @@ impl Response {
             .iter()
             .zip(&less.layers)
             .map(|(more, less)| (more.over - less.over) + (less.under - more.under));
-        let per_log_dose: Vec<_> =
-            // A central difference over the logarithm of the dose.
-            crossed.map(|voxels| voxels as f64 / (2.0 * RANGE.ln())).collect();
-        // d ln e = de / e.
-        let per_dose = per_log_dose.iter().zip(doses).map(|(voxels, dose)| voxels / dose).collect();
-        let layers = simulation.layers().iter().map(|reach| reach.light).collect();
-        Self { per_log_dose, per_dose, layers }
+        // A central difference over the logarithm of the dose; d ln e = de / e.
+        let per_log_dose = crossed.map(|voxels| voxels as f64 / (2.0 * RANGE.ln()));
+        let per_dose = per_log_dose.zip(doses).map(|(voxels, dose)| voxels / dose).collect();
+        let layers = simulation.layers().to_vec();
+        Self { per_dose, layers }
     }
 
     /// Returns the same with another penetration depth: light fades by e over `share` times the
@@ -60,20 +55,9 @@ impl Response {
         Ok(Self { layers: layers.collect(), ..self.clone() })
     }
 
-    /// Returns the number of layers.
-    pub fn layers(&self) -> usize {
-        self.layers.len()
-    }
-
     /// Returns the voxels of each layer that a second of its own light cures: `s`.
     pub fn per_second(&self) -> Vec<f64> {
         self.per_dose.iter().zip(&self.layers).map(|(voxels, layer)| voxels * layer.own).collect()
-    }
-
-    /// Returns the voxels of each layer that cross the critical dose as all doses rise by a
-    /// factor, per logarithm of it.
-    pub fn per_log_dose(&self) -> &[f64] {
-        &self.per_log_dose
     }
 
     /// Returns the number of additional voxels that are cured in each layer: `G dt`.
@@ -86,17 +70,5 @@ impl Response {
             dose * voxels
         });
         cured.collect()
-    }
-
-    /// Returns `Gᵀ x`.
-    pub fn transposed(&self, numbers: &[f64]) -> Vec<f64> {
-        let mut sums = vec![0.0; numbers.len()];
-        let mut sum = 0.0;
-        for k in (0..numbers.len()).rev() {
-            let below = self.layers.get(k + 1).map_or(0.0, |below| below.passed);
-            sum = sum * below + self.per_dose[k] * numbers[k];
-            sums[k] = sum * self.layers[k].own;
-        }
-        sums
     }
 }

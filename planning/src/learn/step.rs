@@ -4,139 +4,257 @@ use lamp_stack::Length;
 
 use super::convergence::{Convergence, convergence, largest_safe_gain};
 use super::error::LearnError;
-use super::heights::{FaceError, LogDoses, face_at, heights_of};
+use super::heights::{FaceError, face_at};
 use super::job::Job;
 use super::law::Law;
 use super::measured::{AreaRow, HeightRow, PrintMeasurements};
 use super::response::Response;
-use crate::speed::{Simulation, SpeedOptions, plan_corrected};
+use super::state::{LightState, MeasuredPrint, Measurement, Model, states_of};
+use crate::speed::{Simulation, SpeedOptions, times_of};
 
 /// The gap of a corrected plan, as a share of the unplanned error.
 const GAP: f64 = 0.001;
-/// The penetration depths, as shares of the model's, for which the decay of errors is reported.
+/// The penetration depths, as shares of the model's, for which the decay of a law's errors is
+/// reported.
 const DEPTHS: [f64; 3] = [1.0, 0.7, 1.3];
+/// The shares of the way to the planned times, as logarithms, that a step may go.
+const SHARES: [f64; 7] = [1.0, 0.75, 0.5, 0.35, 0.2, 0.1, 0.0];
+/// The factors of all times that are tried after that: a plan for one state may lie near a step of
+/// its counts.
+const SCALES: [f64; 4] = [0.96, 0.98, 1.02, 1.04];
+/// The memory that helps: a state is known from thousands of columns as well as from millions.
+const MOST_MEMORY: u64 = 64 << 20;
+/// The measured prints that a state is learned from, the latest ones: light and resin drift.
+const LATEST: usize = 4;
+/// Counts may be this multiple of what there can be, since they have noise.
+const SLACK: f64 = 1.1;
+/// The most wrong pixels that a layer may have, as a multiple of an image's pixels: light cures
+/// beyond the image, too.
+const MOST_WRONG: f64 = 9.0;
 
-/// The next print, and its properties.
+/// How measurements change times.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// By the state of light and resin that all prints show, for which the times are planned again.
+    State,
+    /// By a law of 004, from the last print's wrong pixels.
+    Law(Law),
+}
+
+/// The next print, and the lesson behind it.
 #[derive(Clone, Debug)]
 pub struct Learned {
     /// The times in seconds, from the light on.
     pub times: Vec<f64>,
-    /// The corrections of doses from heights, from the light on.
-    pub log_doses: Vec<f64>,
-    /// The decay of errors with each print, for each penetration depth.
-    pub shrink: Vec<(f64, Convergence)>,
-    /// The largest gain with which no print's errors grow, if the law has a gain.
-    pub safe_gain: Option<f64>,
-    /// The distances by which measured heights are below the model's heights, in micrometers.
-    pub deeper_um: Vec<f64>,
+    /// The lesson.
+    pub lesson: Lesson,
 }
 
-/// Learns from the measurements of a print of a job. `law` turns wrong pixels into times. `step` is
-/// the share of the measured correction that is applied to the doses.
+/// The lesson of a print.
+#[derive(Clone, Debug)]
+pub enum Lesson {
+    /// The state of light and resin.
+    State(Box<StateLesson>),
+    /// The decay of errors by a law.
+    Law {
+        /// The decay with each print, for each of some penetration depths, as shares of the model's.
+        decay: Vec<(f64, Convergence)>,
+        /// The largest gain with which no print's errors grow, in seconds a pixel. It is zero if
+        /// no gain is safe.
+        safe_gain: f64,
+    },
+}
+
+/// The state that the prints show, and what is expected of the next one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StateLesson {
+    /// The state before the print was measured.
+    pub before: LightState,
+    /// The state after.
+    pub after: LightState,
+    /// The root mean square of the distances of the measurements from the state's, in standard
+    /// deviations: about 1 if the state explains them.
+    pub misfit: f64,
+    /// The print with the least error so far, from whose times the step begins.
+    pub from: usize,
+    /// The share of the way from there to the planned times, as logarithms, that leaves the fewest
+    /// wrong voxels at all states that the measurements allow.
+    pub share: f64,
+    /// The wrong voxels of the next print that are expected: their mean, fewest and most.
+    pub expected: [f64; 3],
+    /// The indices of the layers that no time of the platform cures, bottom first.
+    pub uncurable: Vec<u32>,
+}
+
+/// Learns from the measurements of a print of a job, in `memory` bytes.
 ///
 /// # Errors
-/// Returns an error if the stack lacks a measured layer or face, or if the model cannot plan
-/// the part.
+/// Returns an error if the stack lacks a measured layer or face, if a count is impossible, if the
+/// model cannot plan the part, or if a law is to learn from heights.
 pub fn learn(
     job: &Job,
     print: usize,
     measured: &PrintMeasurements,
-    law: &Law,
-    step: f64,
+    method: Method,
     memory: u64,
 ) -> Result<Learned, LearnError> {
-    match measured {
-        PrintMeasurements::Areas(rows) => from_areas(job, print, rows, law, memory),
-        PrintMeasurements::Heights(rows) => from_heights(job, print, rows, step, memory),
+    match (method, measured) {
+        (Method::State, _) => from_state(job, print, measured, memory.min(MOST_MEMORY)),
+        (Method::Law(law), PrintMeasurements::Areas(rows)) => {
+            from_law(job, print, rows, &law, memory)
+        }
+        (Method::Law(_), PrintMeasurements::Heights(_)) => Err(LearnError::LawOfHeights),
     }
 }
 
-/// Returns the errors of each layer from the light on; the errors of layers that are not listed are
-/// zero.
-fn errors_by_layer(job: &Job, rows: &[AreaRow]) -> Result<Vec<f64>, LearnError> {
+/// Returns the layer of a row, counted from the light.
+fn layer_of(job: &Job, row: &AreaRow) -> Result<usize, LearnError> {
     let layers = job.part.layers();
-    let mut errors = vec![0.0; layers.len()];
-    for row in rows {
-        let at = layers.iter().position(|layer| layer.index == row.layer).ok_or_else(|| {
-            let [first, last] = [layers.last(), layers.first()].map(|of| of.map_or(0, |l| l.index));
-            LearnError::NoLayer { line: row.line, layer: row.layer, first, last }
-        })?;
-        errors[at] = row.under - row.over;
+    let most = MOST_WRONG * job.part.size().map(f64::from).iter().product::<f64>();
+    let at = layers.iter().position(|layer| layer.index == row.layer).ok_or_else(|| {
+        let [first, last] = [layers.last(), layers.first()].map(|of| of.map_or(0, |l| l.index));
+        LearnError::NoLayer { line: row.line, layer: row.layer, first, last }
+    })?;
+    let wanted = job.part.wanted_px(at) as f64;
+    for (count, most, column) in [(row.over, most, "over_px"), (row.under, wanted, "under_px")] {
+        if count > SLACK * most {
+            return Err(LearnError::TooMany { line: row.line, column, count, most });
+        }
     }
-    Ok(errors)
+    Ok(at)
 }
 
-fn from_areas(
+fn from_law(
     job: &Job,
     print: usize,
     rows: &[AreaRow],
     law: &Law,
     memory: u64,
 ) -> Result<Learned, LearnError> {
-    let errors = errors_by_layer(job, rows)?;
+    // Layers that are not listed count as right.
+    let mut errors = vec![0.0; job.part.layers().len()];
+    for row in rows {
+        errors[layer_of(job, row)?] = row.under - row.over;
+    }
     let now = &job.prints[print];
-    let simulation = Simulation::corrected(&job.part, &job.light, &now.log_doses, memory)?;
-    let response = Response::of(&simulation, &now.times);
     let [low, high] = job.platform().bounds(job.part.layers())?;
-    let times = law.next(&now.times, &errors, &response, [&low, &high]);
+    let times = law.next(&now.times, &errors, [&low, &high]);
     let times = job.platform().nearest(job.part.layers(), &times)?;
-    let mut shrink = Vec::new();
+    let simulation = Simulation::new(&job.part, &job.light, memory)?;
+    let response = Response::of(&simulation, &now.times);
+    let mut decay = Vec::new();
     for share in DEPTHS {
         let real = response.at_depth(&job.part, &job.light, share)?;
-        shrink.push((share, convergence(law, &now.times, &errors, [&response, &real])));
+        decay.push((share, convergence(law, &errors, &real)));
     }
-    let gain = match law {
-        Law::Single { gain } => Some(*gain),
-        Law::Multi(law) => Some(law.gain),
-        Law::Model(_) => None,
-    };
-    let safe = |gain| gain * largest_safe_gain(law, &now.times, &errors, &response);
-    Ok(Learned {
-        times,
-        log_doses: now.log_doses.clone(),
-        shrink,
-        safe_gain: gain.map(safe),
-        deeper_um: Vec::new(),
-    })
+    let safe_gain = law.gain() * largest_safe_gain(law, &errors, &response);
+    Ok(Learned { times, lesson: Lesson::Law { decay, safe_gain } })
 }
 
-fn from_heights(
+fn from_state(
     job: &Job,
     print: usize,
-    rows: &[HeightRow],
-    step: f64,
+    measured: &PrintMeasurements,
     memory: u64,
 ) -> Result<Learned, LearnError> {
-    let now = &job.prints[print];
-    let faces = rows.iter().map(|row| face_of(job, row)).collect::<Result<Vec<_>, _>>()?;
-    let simulation = Simulation::corrected(&job.part, &job.light, &now.log_doses, memory)?;
-    let mut deeper = Vec::new();
-    for (row, face) in rows.iter().zip(&faces) {
-        let expected = heights_of(&job.part, &simulation, &job.light, &now.times, &[*face]);
-        let expected = expected.map_err(|problem| of_face(row, problem))?;
-        deeper.push((face.1, expected[0].um() - 1000.0 * row.measured_mm, row.sd_um));
-    }
-    let mut log_doses = LogDoses::known(&job.part, now.log_doses.clone());
-    log_doses.step(&deeper, &job.light, step);
+    let earlier = job.prints[..print].iter().filter_map(|print| {
+        let (measured, _) = print.measured.as_ref()?;
+        Some((&print.times, measured))
+    });
+    let all: Vec<_> = earlier.chain([(&job.prints[print].times, measured)]).collect();
+    let prints = all[all.len().saturating_sub(LATEST)..]
+        .iter()
+        .map(|(times, measured)| {
+            let places = places_of(job, measured)?;
+            Ok(MeasuredPrint { times: (*times).clone(), places })
+        })
+        .collect::<Result<Vec<_>, LearnError>>()?;
+    let mut model = Model::new(&job.part, &job.light, memory);
+    let states = states_of(&mut model, &job.material, &prints)?;
+    let after = states.mean.clone();
     let options = SpeedOptions {
-        light: job.light,
+        light: after.light(&job.light),
         platform: job.platform(),
         margin: job.margin(),
         gap: GAP,
         memory,
     };
-    let plan = plan_corrected(&job.part, &options, log_doses.values())?;
-    let left = |share: f64| {
-        let left = (1.0 - step * share).abs();
-        (share, Convergence { radius: left, norm: left })
-    };
-    Ok(Learned {
-        times: plan.times.iter().map(|time| time.ms() / 1000.0).collect(),
-        log_doses: log_doses.values().to_vec(),
-        shrink: DEPTHS.map(left).to_vec(),
-        safe_gain: None,
-        deeper_um: deeper.iter().map(|deeper| deeper.1).collect(),
-    })
+    let layers = job.part.layers();
+    let simulation = model.simulation(&after)?;
+    let planned = times_of(simulation, layers, &options)?;
+    let [_, longest] = job.platform().bounds(layers)?;
+    let [all_cured] = simulation.estimate([&longest]);
+    let uncurable = layers
+        .iter()
+        .enumerate()
+        .rev()
+        .filter(|(at, _)| 2 * all_cured.layers[*at].under > all_cured.wanted[*at]);
+    let uncurable = uncurable.map(|(_, layer)| layer.index).collect();
+    // A step begins at the best of all prints that were measured in the same way.
+    let error = |measured: &PrintMeasurements| measured.error().number();
+    let measured_prints = (0..print)
+        .filter_map(|number| Some((number, &job.prints[number].measured.as_ref()?.0)))
+        .chain([(print, measured)])
+        .filter(|(_, other)| other.is_comparable(measured));
+    let from = measured_prints
+        .min_by(|a, b| error(a.1).total_cmp(&error(b.1)))
+        .map_or(print, |best| best.0);
+    let mut steps = Vec::new();
+    for share in SHARES {
+        let between = |(from, to): (&f64, &f64)| from.powf(1.0 - share) * to.powf(share);
+        let times: Vec<_> = job.prints[from].times.iter().zip(&planned).map(between).collect();
+        steps.push(job.platform().nearest(layers, &times)?);
+    }
+    let expected = states.expected(&mut model, slices::<{ SHARES.len() }>(&steps))?;
+    // Of equal steps, the longest is first.
+    let step = least_of(&expected);
+    let (mut times, mut expected) = (steps.swap_remove(step), expected[step]);
+    let mut scaled = Vec::new();
+    for scale in SCALES {
+        let times: Vec<_> = times.iter().map(|time| time * scale).collect();
+        scaled.push(job.platform().nearest(layers, &times)?);
+    }
+    let of_scales = states.expected(&mut model, slices::<{ SCALES.len() }>(&scaled))?;
+    let scale = least_of(&of_scales);
+    if of_scales[scale][0] < expected[0] {
+        (times, expected) = (scaled.swap_remove(scale), of_scales[scale]);
+    }
+    let before = job.prints[print].state.clone();
+    let before = before.unwrap_or_else(|| LightState::of_material(&job.material));
+    let (share, misfit) = (SHARES[step], states.misfit);
+    let lesson = StateLesson { before, after, misfit, from, share, expected, uncurable };
+    Ok(Learned { times, lesson: Lesson::State(Box::new(lesson)) })
+}
+
+fn slices<const N: usize>(all: &[Vec<f64>]) -> [&[f64]; N] {
+    std::array::from_fn(|number| all[number].as_slice())
+}
+
+/// Returns the number of the times that are expected to leave the fewest wrong voxels.
+fn least_of(expected: &[[f64; 3]]) -> usize {
+    let least = (0..expected.len()).min_by(|&a, &b| expected[a][0].total_cmp(&expected[b][0]));
+    least.expect("there are times to choose from")
+}
+
+/// Returns the measured numbers with their layers.
+fn places_of(job: &Job, measured: &PrintMeasurements) -> Result<Vec<Measurement>, LearnError> {
+    match measured {
+        PrintMeasurements::Areas(rows) => rows
+            .iter()
+            .map(|row| {
+                let counts = [row.over, row.under];
+                Ok(Measurement::Counts { layer: layer_of(job, row)?, counts })
+            })
+            .collect(),
+        PrintMeasurements::Heights(rows) => rows
+            .iter()
+            .map(|row| {
+                let (pixel, layer) = face_of(job, row)?;
+                let um = 1000.0 * row.measured_mm;
+                Ok(Measurement::Height { layer, pixel, um, sd_um: row.sd_um })
+            })
+            .collect(),
+    }
 }
 
 /// Returns the pixel and the layer of a measured face.

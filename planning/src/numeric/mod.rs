@@ -1,17 +1,15 @@
-//! Numerical methods that are independent of light: descent between bounds, conjugate gradients,
-//! and equations of small matrices.
+//! Numerical methods that are independent of light: descent between bounds, and equations of small
+//! matrices.
 //!
 //! Each adds numbers in one order, whatever the number of threads, so that plans are the same to
 //! the last bit.
 
 mod bounded;
 mod cholesky;
-mod conjugate_gradients;
 mod lbfgs;
 
 pub(crate) use bounded::{Bounded, CurvatureMatrix, SearchPlace};
 pub(crate) use cholesky::solve_positive;
-pub(crate) use conjugate_gradients::solve_by_conjugate_gradients;
 pub(crate) use lbfgs::{DescentEnd, descend};
 
 /// Returns the sum of products, from the first to the last.

@@ -10,15 +10,6 @@ use super::columns::{ColumnBlock, LANES, PixelColumns};
 use crate::light::LayerLight;
 use crate::wide::wide;
 
-/// The light that reaches a layer's voxels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct LightReach {
-    /// The share that passes, and the dose of a second under a wide white field.
-    pub(crate) light: LayerLight,
-    /// The factor on the dose before it is compared: 1, or a factor from measurements.
-    pub(crate) scale: f64,
-}
-
 /// The error of times, and its slopes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Priced {
@@ -57,7 +48,7 @@ impl Priced {
 /// The error of a part's voxels as a function of times.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hinge<'a> {
-    pub(crate) layers: &'a [LightReach],
+    pub(crate) layers: &'a [LayerLight],
     /// The distance that doses must keep from 1.
     pub(crate) margin: f64,
     /// The error is exact at this distance from the kink and farther; zero leaves the kink.
@@ -92,11 +83,10 @@ impl Hinge<'_> {
     fn price(&self, block: &ColumnBlock, doses: &[f32]) -> Priced {
         let mut priced = Priced::none(self.layers.len());
         let mut cost = [0.0_f32; LANES];
-        for (layer, reach) in self.layers.iter().enumerate().rev() {
+        for (layer, light_of) in self.layers.iter().enumerate().rev() {
             let of_layer = layer * LANES..(layer + 1) * LANES;
             let (light, doses) = (&block.light[of_layer.clone()], &doses[of_layer]);
-            let below = self.layers.get(layer + 1).map_or(0.0, |below| below.light.passed as f32);
-            let scale = reach.scale as f32;
+            let below = self.layers.get(layer + 1).map_or(0.0, |below| below.passed as f32);
             let [mut error, mut linear, mut slope] = [[0.0_f32; 16]; 3];
             for lane in 0..LANES {
                 // Sixteen sums side by side are two wide registers. A single sum would wait for
@@ -106,19 +96,19 @@ impl Hinge<'_> {
                 let sign = 1.0_f32.copysign(light[lane]);
                 // Wanted voxels err by 1 + m - e, others by e - 1 + m: one formula with the sign of
                 // their role (004 eq. 3.1 to 3.3 count the same voxels without a margin).
-                let x = self.margin as f32 + sign * (doses[lane] * scale - 1.0);
+                let x = self.margin as f32 + sign * (doses[lane] - 1.0);
                 let y = self.slope(x) * weight;
                 error[sum] += self.smoothed(x) * weight;
                 linear[sum] += x * y;
                 // The transpose of the recursion in `expose`: a second of this layer's light also
                 // reaches all layers below it, reduced by the absorption between (004 eq. 2.5).
-                cost[lane] = cost[lane] * below + sign * y * scale;
+                cost[lane] = cost[lane] * below + sign * y;
                 slope[sum] += cost[lane] * light[lane].abs();
             }
             let total = |sums: [f32; 16]| sums.into_iter().map(f64::from).sum::<f64>();
             priced.error += total(error);
             priced.priced += total(linear);
-            priced.slopes[layer] = total(slope) * reach.light.own;
+            priced.slopes[layer] = total(slope) * light_of.own;
         }
         priced
     }
@@ -146,14 +136,14 @@ impl Hinge<'_> {
 #[inline(always)]
 pub(crate) fn expose(
     block: &ColumnBlock,
-    layers: &[LightReach],
+    layers: &[LayerLight],
     times: &[f64],
     doses: &mut Vec<f32>,
 ) {
     doses.resize(block.light.len(), 0.0);
     let mut above = [0.0_f32; LANES];
     for (layer, (reach, time)) in layers.iter().zip(times).enumerate() {
-        let (passed, own) = (reach.light.passed as f32, (reach.light.own * time) as f32);
+        let (passed, own) = (reach.passed as f32, (reach.own * time) as f32);
         let light = &block.light[layer * LANES..(layer + 1) * LANES];
         let doses = &mut doses[layer * LANES..(layer + 1) * LANES];
         for lane in 0..LANES {
@@ -182,12 +172,8 @@ mod tests {
         set.finish()
     }
 
-    fn layers() -> Vec<LightReach> {
-        let reach = |k: u32| LightReach {
-            light: LayerLight { passed: 0.8, own: 0.5 + 0.1 * f64::from(k) },
-            scale: 1.0 + 0.05 * f64::from(k),
-        };
-        (0..5).map(reach).collect()
+    fn layers() -> Vec<LayerLight> {
+        (0..5).map(|k| LayerLight { passed: 0.8, own: 0.5 + 0.1 * f64::from(k) }).collect()
     }
 
     #[test]

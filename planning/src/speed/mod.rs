@@ -17,9 +17,8 @@ mod times_table;
 
 pub use feasible::{Platform, PlatformError, Speed};
 pub use part::{PartError, PartPages, TimedLayer, TimedPart};
-pub use plan::{
-    SPEED_CODE, SearchStage, SpeedOptions, SpeedPlan, SpeedPlanError, plan, plan_corrected,
-};
+pub(crate) use plan::times_of;
+pub use plan::{SPEED_CODE, SearchStage, SpeedOptions, SpeedPlan, SpeedPlanError, plan};
 pub use simulation::{MOST_SPEED_MEMORY, Simulation};
 pub use tally::{DOSE_BINS, LIGHT_SHARES, Tally, Wrong};
 pub use times_table::{recorded_ms, times_table};

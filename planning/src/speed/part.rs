@@ -151,6 +151,49 @@ impl TimedPart {
         light.spread_pixels(self.pitch)
     }
 
+    /// Returns the number of pixels of a layer that belong to the part.
+    pub fn wanted_px(&self, layer: usize) -> u64 {
+        let image = &self.images[layer];
+        let runs = (0..image.height()).flat_map(|row| image.runs(row));
+        let wanted = runs.filter(|run| run.2 >= self.wanted);
+        wanted.map(|(from, to, _)| u64::from(to - from)).sum()
+    }
+
+    /// Returns the length of the part's outline in each layer, in sides of pixels.
+    pub(crate) fn edges_px(&self) -> Vec<f64> {
+        let of_layer = |image: &Image| {
+            let mut sides = 0_u64;
+            let mut above: Vec<[u32; 2]> = Vec::new();
+            let mut runs: Vec<[u32; 2]> = Vec::new();
+            for row in 0..=image.height() {
+                runs.clear();
+                if row < image.height() {
+                    let wanted = image.runs(row).filter(|run| run.2 >= self.wanted);
+                    for (from, to, _) in wanted {
+                        match runs.last_mut() {
+                            Some(last) if last[1] == from => last[1] = to,
+                            _ => runs.push([from, to]),
+                        }
+                    }
+                }
+                let length = |runs: &[[u32; 2]]| {
+                    runs.iter().map(|run| u64::from(run[1] - run[0])).sum::<u64>()
+                };
+                // Upright sides, and the lying ones between this row and the row above it.
+                sides += 2 * runs.len() as u64 + length(&above) + length(&runs);
+                let (mut a, mut b) = (0, 0);
+                while let (Some(up), Some(here)) = (above.get(a), runs.get(b)) {
+                    let shared = up[1].min(here[1]).saturating_sub(up[0].max(here[0]));
+                    sides -= 2 * u64::from(shared);
+                    *(if up[1] < here[1] { &mut a } else { &mut b }) += 1;
+                }
+                std::mem::swap(&mut above, &mut runs);
+            }
+            sides as f64
+        };
+        self.images.iter().map(of_layer).collect()
+    }
+
     /// Returns the least level of the part.
     pub(crate) fn wanted(&self) -> u8 {
         self.wanted

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::feasible::{Feasible, Platform, PlatformError};
 use super::hinge::{Hinge, Priced};
-use super::part::{PartError, TimedPart};
+use super::part::{PartError, TimedLayer, TimedPart};
 use super::simulation::Simulation;
 use super::tally::Tally;
 use crate::light::Light;
@@ -97,22 +97,8 @@ const STEPS: usize = 300;
 /// Returns an error if the model's or the platform's numbers are impossible, or if no voxel
 /// belongs to the part.
 pub fn plan(part: &TimedPart, options: &SpeedOptions) -> Result<SpeedPlan, SpeedPlanError> {
-    let none = vec![0.0; part.layers().len()];
-    plan_corrected(part, options, &none)
-}
-
-/// Finds the times of a part's layers, given the correction that measurements add to the logarithm
-/// of each layer's dose.
-///
-/// # Errors
-/// As [`plan`].
-pub fn plan_corrected(
-    part: &TimedPart,
-    options: &SpeedOptions,
-    log_doses: &[f64],
-) -> Result<SpeedPlan, SpeedPlanError> {
     let feasible = Feasible::new(&options.platform, part.layers())?;
-    let simulation = Simulation::corrected(part, &options.light, log_doses, options.memory)?;
+    let simulation = Simulation::new(part, &options.light, options.memory)?;
     let problem = TimesProblem { simulation: &simulation, feasible, options };
     let (single, single_error) = problem.best_single();
     let (times, stages) = problem.search(&single, single_error);
@@ -130,6 +116,18 @@ pub fn plan_corrected(
         stages,
         sampled: simulation.sampled(),
     })
+}
+
+/// Finds the times, in seconds, for a part that is simulated already. Its voxels are not counted.
+pub(crate) fn times_of(
+    simulation: &Simulation<'_>,
+    layers: &[TimedLayer],
+    options: &SpeedOptions,
+) -> Result<Vec<f64>, PlatformError> {
+    let feasible = Feasible::new(&options.platform, layers)?;
+    let problem = TimesProblem { simulation, feasible, options };
+    let (single, single_error) = problem.best_single();
+    Ok(problem.search(&single, single_error).0)
 }
 
 struct TimesProblem<'a> {

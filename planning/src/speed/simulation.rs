@@ -2,11 +2,10 @@
 
 use super::columns::PixelColumns;
 use super::gather::Gather;
-use super::hinge::LightReach;
 use super::part::{PartError, TimedPart};
-use super::tally::Tally;
+use super::tally::{GradualWrong, Tally, gradual_wrong};
 use crate::blur::Blur;
-use crate::light::Light;
+use crate::light::{LayerLight, Light};
 
 /// The share of the memory for columns, and the most that is useful.
 const COLUMNS_SHARE: u64 = 4;
@@ -19,7 +18,7 @@ pub const MOST_SPEED_MEMORY: u64 = COLUMNS_SHARE * MOST_COLUMN_BYTES;
 /// A part under a light, whose layers can be given times.
 pub struct Simulation<'a> {
     gather: Gather<'a>,
-    layers: Vec<LightReach>,
+    layers: Vec<LayerLight>,
     columns: PixelColumns,
     sampled: u32,
 }
@@ -30,32 +29,18 @@ impl<'a> Simulation<'a> {
     /// # Errors
     /// Returns an error if the model's numbers are impossible.
     pub fn new(part: &'a TimedPart, light: &Light, memory: u64) -> Result<Self, PartError> {
-        Self::corrected(part, light, &vec![0.0; part.layers().len()], memory)
-    }
-
-    /// Prepares a part, given the correction that measurements add to the logarithm of each layer's
-    /// dose.
-    ///
-    /// # Errors
-    /// Returns an error if the model's numbers are impossible.
-    pub fn corrected(
-        part: &'a TimedPart,
-        light: &Light,
-        log_doses: &[f64],
-        memory: u64,
-    ) -> Result<Self, PartError> {
-        let field = Blur::<f32>::of_scan(part.spread_pixels(light)).sum();
-        let per_second = part.per_second(light)?.into_iter().zip(log_doses);
-        let layers = per_second.map(|(mut light, log_dose)| {
-            // Columns have the light 1 under a wide white field.
-            light.own *= field;
-            LightReach { light, scale: log_dose.exp() }
-        });
-        let layers = layers.collect();
+        let layers = reaches(part, light)?;
         let gather = Gather::new(part, light);
         let bytes = (memory / COLUMNS_SHARE).min(MOST_COLUMN_BYTES);
         let (columns, sampled) = gather.columns(bytes as usize);
         Ok(Self { gather, layers, columns, sampled })
+    }
+
+    /// Changes the light. Light must spread as before, since the light of the
+    /// columns depends on it.
+    pub(crate) fn relight(&mut self, part: &TimedPart, light: &Light) -> Result<(), PartError> {
+        self.layers = reaches(part, light)?;
+        Ok(())
     }
 
     /// Counts the result of each set of times, in seconds, the layer nearest to the light first.
@@ -77,14 +62,25 @@ impl<'a> Simulation<'a> {
         sums
     }
 
+    /// Counts the result of each set of times in the columns that a search sees: an estimate, if
+    /// they are a sample.
+    pub(crate) fn estimate<const N: usize>(&self, times: [&[f64]; N]) -> [Tally; N] {
+        times.map(|times| Tally::of(&self.columns, &self.layers, times))
+    }
+
+    /// Returns the wrong voxels of each layer where a voxel's cured share rises straight from 0 to 1
+    /// over this range around the critical dose.
+    pub(crate) fn gradual_wrong(&self, times: &[f64], half_range: f64) -> Vec<GradualWrong> {
+        gradual_wrong(&self.columns, &self.layers, times, half_range)
+    }
+
     /// Returns the dose of each layer under a wide white field.
     pub fn field_doses(&self, times: &[f64]) -> Vec<f64> {
         let mut dose = 0.0;
-        let of_layer = |(reach, time): (&LightReach, &f64)| {
-            // 004 eq. 2.5 from layer to layer. A correction by measurements is a factor of the
-            // dose, and does not pass on to other layers.
-            dose = dose * reach.light.passed + reach.light.own * time;
-            dose * reach.scale
+        let of_layer = |(layer, time): (&LayerLight, &f64)| {
+            // 004 eq. 2.5 from layer to layer.
+            dose = dose * layer.passed + layer.own * time;
+            dose
         };
         self.layers.iter().zip(times).map(of_layer).collect()
     }
@@ -96,29 +92,38 @@ impl<'a> Simulation<'a> {
     /// a half.
     pub fn times_for(&self, dose: f64) -> Vec<f64> {
         let mut above = 0.0;
-        let of_layer = |reach: &LightReach| {
+        let of_layer = |layer: &LayerLight| {
             // A layer can get more light, but the light that reaches it from above cannot be
             // removed.
-            let passed = above * reach.light.passed;
-            above = passed.max(dose / reach.scale);
-            (above - passed) / reach.light.own
+            let passed = above * layer.passed;
+            above = passed.max(dose);
+            (above - passed) / layer.own
         };
         self.layers.iter().map(of_layer).collect()
     }
 
     /// Returns the dose of a pixel in each layer, in units of the critical dose.
     pub fn doses_at(&self, pixel: [u32; 2], times: &[f64]) -> Vec<f64> {
+        self.doses_of(&self.light_at(pixel), times)
+    }
+
+    /// Returns the light of a pixel in each layer.
+    pub(crate) fn light_at(&self, pixel: [u32; 2]) -> Vec<f32> {
+        self.gather.light_at(pixel)
+    }
+
+    /// Returns the dose of a pixel with this light in each layer.
+    pub(crate) fn doses_of(&self, light: &[f32], times: &[f64]) -> Vec<f64> {
         let mut dose = 0.0;
-        let light = self.gather.light_at(pixel);
-        let of_layer = |((reach, time), light): ((&LightReach, &f64), f32)| {
-            dose = dose * reach.light.passed + reach.light.own * time * f64::from(light);
-            dose * reach.scale
+        let of_layer = |((layer, time), light): ((&LayerLight, &f64), &f32)| {
+            dose = dose * layer.passed + layer.own * time * f64::from(*light);
+            dose
         };
         self.layers.iter().zip(times).zip(light).map(of_layer).collect()
     }
 
     /// Returns the light that reaches each layer in a second.
-    pub(crate) fn layers(&self) -> &[LightReach] {
+    pub(crate) fn layers(&self) -> &[LayerLight] {
         &self.layers
     }
 
@@ -131,4 +136,12 @@ impl<'a> Simulation<'a> {
     pub(crate) fn sampled(&self) -> u32 {
         self.sampled
     }
+}
+
+/// Returns the light that reaches each layer in a second, for columns that have the light 1 under a
+/// wide white field.
+fn reaches(part: &TimedPart, light: &Light) -> Result<Vec<LayerLight>, PartError> {
+    let field = Blur::<f32>::of_scan(part.spread_pixels(light)).sum();
+    let per_second = part.per_second(light)?.into_iter();
+    Ok(per_second.map(|layer| LayerLight { own: layer.own * field, ..layer }).collect())
 }

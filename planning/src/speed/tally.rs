@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::columns::{ColumnBlock, LANES, PixelColumns};
-use super::hinge::{LightReach, expose};
+use super::hinge::expose;
+use crate::light::LayerLight;
 use crate::wide::wide;
 
 /// The light of each count, as a share of the model's light: counts are made at all of these.
@@ -73,7 +74,7 @@ impl Tally {
     }
 
     /// Counts the voxels of all columns.
-    pub(crate) fn of(columns: &PixelColumns, layers: &[LightReach], times: &[f64]) -> Self {
+    pub(crate) fn of(columns: &PixelColumns, layers: &[LayerLight], times: &[f64]) -> Self {
         let count = |room: &mut Vec<f32>, block: &ColumnBlock| {
             wide(
                 #[inline(always)]
@@ -91,15 +92,14 @@ impl Tally {
     }
 
     #[inline(always)]
-    fn of_block(block: &ColumnBlock, layers: &[LightReach], doses: &[f32]) -> Self {
+    fn of_block(block: &ColumnBlock, layers: &[LayerLight], doses: &[f32]) -> Self {
         let mut tally = Self::none(layers.len());
-        for (layer, reach) in layers.iter().enumerate() {
-            let scale = reach.scale as f32;
+        for layer in 0..layers.len() {
             let mut wrong = [Wrong::default(); 3];
             for lane in 0..LANES {
                 let (place, count) = (layer * LANES + lane, block.weights[lane] as u64);
                 // The sign of a column's light is the voxel's role, even for zero light.
-                let (dose, wanted) = (doses[place] * scale, block.light[place].is_sign_negative());
+                let (dose, wanted) = (doses[place], block.light[place].is_sign_negative());
                 for (wrong, share) in wrong.iter_mut().zip(LIGHT_SHARES) {
                     // 004 eq. 2.15: at the critical dose resin begins to cure.
                     let cured = dose * share as f32 >= 1.0;
@@ -119,4 +119,74 @@ impl Tally {
         }
         tally
     }
+}
+
+/// The wrong voxels of a layer as a smooth function of its dose.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct GradualWrong {
+    /// Cured voxels outside the part, and voxels of the part that are not cured.
+    pub(crate) counts: [f64; 2],
+    /// Their slopes by the logarithm of the layer's dose.
+    pub(crate) slopes: [f64; 2],
+}
+
+/// Counts the voxels of all columns, where a voxel's cured share rises straight from 0 to 1 over
+/// this range around the critical dose.
+pub(crate) fn gradual_wrong(
+    columns: &PixelColumns,
+    layers: &[LayerLight],
+    times: &[f64],
+    half_range: f64,
+) -> Vec<GradualWrong> {
+    let count = |room: &mut Vec<f32>, block: &ColumnBlock| {
+        wide(
+            #[inline(always)]
+            || {
+                expose(block, layers, times, room);
+                gradual_of_block(block, layers, room, half_range as f32)
+            },
+        )
+    };
+    let blocks: Vec<_> = columns.blocks().par_iter().map_init(Vec::new, count).collect();
+    let mut all = vec![GradualWrong::default(); columns.layers()];
+    // Blocks are added in order, so the sum is the same on any number of threads.
+    for block in &blocks {
+        for (sum, of_layer) in all.iter_mut().zip(block) {
+            for which in 0..2 {
+                sum.counts[which] += of_layer.counts[which];
+                sum.slopes[which] += of_layer.slopes[which];
+            }
+        }
+    }
+    all
+}
+
+#[inline(always)]
+fn gradual_of_block(
+    block: &ColumnBlock,
+    layers: &[LayerLight],
+    doses: &[f32],
+    half_range: f32,
+) -> Vec<GradualWrong> {
+    let steepness = (2.0 * half_range).recip();
+    let mut all = Vec::with_capacity(layers.len());
+    for layer in 0..layers.len() {
+        let mut sums = [[0.0_f32; 16]; 4];
+        for lane in 0..LANES {
+            let (sum, place) = (lane % 16, layer * LANES + lane);
+            let dose = doses[place];
+            let cured = (0.5 + (dose - 1.0) * steepness).clamp(0.0, 1.0);
+            let is_between = f32::from(u8::from(cured > 0.0 && cured < 1.0));
+            let slope = is_between * steepness * dose * block.weights[lane];
+            let is_wanted = f32::from(u8::from(block.light[place].is_sign_negative()));
+            sums[0][sum] += block.weights[lane] * (1.0 - is_wanted) * cured;
+            sums[1][sum] += block.weights[lane] * is_wanted * (1.0 - cured);
+            sums[2][sum] += (1.0 - is_wanted) * slope;
+            sums[3][sum] -= is_wanted * slope;
+        }
+        let total = |sums: [f32; 16]| sums.into_iter().map(f64::from).sum::<f64>();
+        let [over, under, over_slope, under_slope] = sums.map(total);
+        all.push(GradualWrong { counts: [over, under], slopes: [over_slope, under_slope] });
+    }
+    all
 }

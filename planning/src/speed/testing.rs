@@ -21,17 +21,6 @@ pub(crate) fn pegda(spread_um: f64) -> Light {
     }
 }
 
-/// A possible deviation of a print from its model: the light is 10 % brighter, light reaches a
-/// quarter deeper, and 15 % less dose cures.
-pub(crate) fn plant(model: &Light) -> Light {
-    Light {
-        intensity: Intensity::from_mw_per_cm2(1.1 * model.intensity.mw_per_cm2()),
-        critical_dose: Dose::from_mj_per_cm2(0.85 * model.critical_dose.mj_per_cm2()),
-        penetration_depth: Length::from_um(1.25 * model.penetration_depth.um()),
-        ..*model
-    }
-}
-
 pub(crate) fn part(voxels: &Voxels) -> TimedPart {
     let mut pages = PartPages::new(128);
     voxels.layers().for_each(|layer| pages.push(layer).unwrap());

@@ -4,6 +4,7 @@ mod begin;
 mod plot;
 mod report;
 
+use std::fs;
 use std::num::NonZeroU8;
 use std::path::{Path, PathBuf};
 
@@ -11,7 +12,7 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use lamp_pipeline::memory;
 use lamp_planning::SampleHeight;
-use lamp_planning::learn::{Job, Law, PrintMeasurements, learn};
+use lamp_planning::learn::{Job, Law, Method, PrintMeasurements, learn};
 use lamp_planning::speed::{Platform, Speed};
 
 use crate::args::lamp_option::LampOption;
@@ -34,8 +35,9 @@ const MAX_TABLE: u64 = 64 << 20;
 ///
 /// A job is a folder that keeps a stack, its material, and the times and measurements of all
 /// prints. Begin a job with a stack that has exposure times, print it, and give your measurements:
-/// the heights of downward faces, or the wrongly cured pixels of each layer. The command writes the
-/// times for the next print, and prints whether such steps make errors smaller.
+/// the heights of downward faces, or the wrongly cured pixels of each layer. The command finds the
+/// state of light and resin that all prints show, plans the times again for that state, and writes
+/// them for the next print.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -63,17 +65,13 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "N", requires = "measured")]
     print: Option<usize>,
 
-    /// Law that turns wrong pixels into times
-    #[arg(long, value_enum, default_value = "model")]
-    law: LawName,
+    /// Change the times by a law of wrong pixels, without a plan
+    #[arg(long, value_enum, requires = "measured")]
+    law: Option<LawName>,
 
-    /// Gain of the laws single and multi, in seconds per pixel [default: 6e-6]
-    #[arg(long, value_name = "S/PX", value_parser = parse_gain)]
+    /// Gain of a law, in seconds per pixel [default: 6e-6]
+    #[arg(long, value_name = "S/PX", value_parser = parse_gain, requires = "law")]
     gain: Option<f64>,
-
-    /// Share of the full correction by which measured heights change the doses
-    #[arg(long, value_name = "SHARE", default_value = "0.5", value_parser = parse_step)]
-    correction: f64,
 
     /// Write the layers' times for the next print
     #[arg(short, long, value_name = "NEXT.csv", requires = "measured", value_parser = parse_table)]
@@ -134,8 +132,6 @@ impl KeptOptions {
 /// Laws of learning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum LawName {
-    /// The best step according to the model
-    Model,
     /// Each layer from its own error
     Single,
     /// Each layer from the errors around and below it
@@ -143,15 +139,12 @@ enum LawName {
 }
 
 impl LearnArgs {
-    fn law(&self) -> Result<Law, Exit> {
+    fn method(&self) -> Method {
         let gain = self.gain.unwrap_or(Law::GAIN);
         match self.law {
-            LawName::Model if self.gain.is_some() => {
-                Err(Exit::usage("--gain is for --law single and multi: the model needs none"))
-            }
-            LawName::Model => Ok(Law::model()),
-            LawName::Single => Ok(Law::Single { gain }),
-            LawName::Multi => Ok(Law::multi(gain)),
+            None => Method::State,
+            Some(LawName::Single) => Method::Law(Law::Single { gain }),
+            Some(LawName::Multi) => Method::Law(Law::multi(gain)),
         }
     }
 }
@@ -176,7 +169,6 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
         return Err(Exit::usage("name a file for the next profile, such as -o next.csv"));
     }
     args.check_outputs(measured)?;
-    let law = args.law()?;
     let memory = args.memory.unwrap_or_else(|| memory::available() / 4);
     let mut job = open(&args.job, &progress)?;
     let name = input_name(measured);
@@ -188,7 +180,7 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     let again = if may_be_again { job.take_back(&text) } else { None };
     let print_number = again.map_or_else(|| job.print_to_learn_from(args.print), Ok)?;
     job.refuse_known(print_number, &text)?;
-    let learned = learn(&job, print_number, &measured, &law, args.correction, memory)
+    let learned = learn(&job, print_number, &measured, args.method(), memory)
         .map_err(|error| Exit::from(error).at(name))?;
     match again {
         Some(print) => {
@@ -243,7 +235,16 @@ impl LearnArgs {
         let files: Vec<_> =
             self.output.iter().chain(self.report.path()).chain(&self.plot).collect();
         let measured = measured.to_owned();
+        let job = fs::canonicalize(&self.job).ok();
         for (number, path) in files.iter().enumerate() {
+            let folder =
+                path.parent().map(|folder| if folder == "" { Path::new(".") } else { folder });
+            let folder = folder.and_then(|folder| fs::canonicalize(folder).ok());
+            if job.is_some() && folder == job {
+                let sealed =
+                    format!("{} is in the job's folder: name another file", path.display());
+                return Err(Exit::usage(sealed));
+            }
             let others = std::iter::once(&measured).chain(files[..number].iter().copied());
             check_beside(path, Path::new("-"), others)?;
         }
@@ -255,13 +256,5 @@ fn parse_gain(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(gain) if gain > 0.0 && gain < 1e3 => Ok(gain),
         _ => Err(format!("`{text}` is not a gain in seconds a pixel: write 6e-6")),
-    }
-}
-
-fn parse_step(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        // Beyond twice the way, a step ends farther off than it began.
-        Ok(step) if step > 0.0 && step <= 2.0 => Ok(step),
-        _ => Err(format!("`{text}` is not a step above 0 and up to 2: write 0.5")),
     }
 }

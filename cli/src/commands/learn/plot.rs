@@ -1,9 +1,9 @@
 //! Plots the errors and the times of a job's prints (004 figures 3.7 and 3.8).
 
-use lamp_planning::learn::{Job, JobPrint, PrintMeasurements};
+use lamp_planning::learn::{Job, JobPrint, LightState, PrintError, PrintMeasurements};
 use lamp_planning::speed::TimedLayer;
 
-use super::report::{PrintError, error_of};
+use super::report::error_of;
 use lamp_plots::{Plot, Series, by_layer, curve, linear};
 
 /// The most prints that are drawn: the first, and the last.
@@ -20,6 +20,7 @@ pub(super) fn plots_of(job: &Job) -> Vec<Plot> {
         .collect();
     let mut plots = Vec::new();
     plots.extend(course(job));
+    plots.extend(states(job));
     let areas: Vec<_> = drawn.iter().filter_map(|&(n, print)| areas(job, n, print)).collect();
     if !areas.is_empty() {
         let title = "Pixels to cure in each layer; below zero: too many are cured".to_owned();
@@ -57,10 +58,32 @@ fn course(job: &Job) -> Vec<Plot> {
         (!points.is_empty()).then(|| Plot { title: title.to_owned(), x, y, series })
     };
     let is_of_areas = |error| matches!(error, PrintError::Pixels(_));
-    let is_of_heights = |error| matches!(error, PrintError::Micrometres(_));
+    let is_of_heights = |error| matches!(error, PrintError::Micrometers(_));
     let areas = of("Wrong pixels of each print", "pixels", is_of_areas);
     let heights = of("Errors of heights, root mean square", "error (µm)", is_of_heights);
     areas.into_iter().chain(heights).collect()
+}
+
+/// The states that prints were planned for.
+fn states(job: &Job) -> Option<Plot> {
+    let states: Vec<_> = job
+        .prints
+        .iter()
+        .enumerate()
+        .filter_map(|(number, print)| Some((number as f64, print.state.as_ref()?.factors())))
+        .collect();
+    let of_number = |(at, name): (usize, &&str)| {
+        let points: Vec<_> =
+            states.iter().map(|(number, factors)| (*number, factors[at].value)).collect();
+        Series { points: points.clone(), ..curve(name, points) }
+    };
+    let series: Vec<_> = LightState::NAMES.iter().enumerate().map(of_number).collect();
+    let values = || states.iter().flat_map(|(_, factors)| factors.map(|factor| factor.value));
+    let (low, high) = (values().fold(1.0, f64::min), values().fold(1.0, f64::max));
+    let title = "Light and resin that each print was planned for".to_owned();
+    let x = linear("print", -0.5..job.prints.len() as f64 - 0.5);
+    let y = linear("times the material's", 0.9 * low..1.1 * high);
+    (!states.is_empty()).then_some(Plot { title, x, y, series })
 }
 
 fn areas(job: &Job, number: usize, print: &JobPrint) -> Option<Series> {
