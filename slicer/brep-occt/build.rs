@@ -16,7 +16,8 @@ mod occt {
     const SOURCES: [&str; 2] = ["read.cpp", "mesh.cpp"];
     const HEADERS: [&str; 2] = ["model.hpp", "shim.hpp"];
     /// The libraries. Each precedes the libraries that it needs.
-    const LIBRARIES: [&str; 12] = [
+    const LIBRARIES: [&str; 13] = [
+        "TKIGES",
         "TKSTEP",
         "TKSTEPBase",
         "TKXSBase",

@@ -52,6 +52,9 @@ pub enum SliceError {
         /// The name of a file in it; the name of a part if it contains one.
         name: String,
     },
+    /// The file is IGES, which LAMP's own kernel does not read.
+    #[error("this is an IGES file, which only OpenCASCADE reads")]
+    Iges,
     /// The format is supported, but only STEP files are allowed here.
     #[error("this is {0}, not a STEP file")]
     NotStep(FileFormat),

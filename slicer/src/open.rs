@@ -25,7 +25,7 @@ use crate::stl;
 use crate::three_mf::{self, Contents, looks_packaged};
 use crate::unpack::{is_gzip, unpack, unpack_bytes};
 
-/// The program that reads STEP files.
+/// The program that reads STEP files, and IGES files if it can.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KernelName {
     /// LAMP itself.
@@ -40,13 +40,19 @@ pub enum KernelName {
 }
 
 impl KernelName {
-    fn read(self) -> ReadFn {
-        match self {
-            Self::Lamp => lamp_brep::read_step,
+    /// Returns the function that reads a file's bytes.
+    fn read(self, bytes: &[u8]) -> Result<ReadFn, SliceError> {
+        let start = &bytes[..bytes.len().min(FORMAT_BYTES)];
+        let format = FileFormat::of_start(start, Some(bytes.len() as u64));
+        match (self, format) {
             #[cfg(feature = "occt")]
-            Self::Both => lamp_brep::read_step,
+            (Self::Occt, Some(FileFormat::IGES)) => Ok(lamp_brep_occt::read_iges),
+            (_, Some(FileFormat::IGES)) => Err(SliceError::Iges),
+            (Self::Lamp, _) => Ok(lamp_brep::read_step),
             #[cfg(feature = "occt")]
-            Self::Occt => lamp_brep_occt::read,
+            (Self::Both, _) => Ok(lamp_brep::read_step),
+            #[cfg(feature = "occt")]
+            (Self::Occt, _) => Ok(lamp_brep_occt::read),
         }
     }
 }
@@ -192,7 +198,7 @@ fn unpacked(
     }
     let of_facets = |facets, notes| of_one(Piece::new(facets), notes);
     match format {
-        Some(FileFormat::Part(PartFormat::Step)) => {
+        Some(FileFormat::Part(PartFormat::Step) | FileFormat::IGES) => {
             let mut bytes = Vec::new();
             file.reader().read_to_end(&mut bytes)?;
             let prepared = read_good(&bytes.into(), options)?;
@@ -233,7 +239,7 @@ fn unpacked(
     }
 }
 
-/// Returns the bytes of a STEP file, which may be compressed with gzip.
+/// Returns the bytes of a STEP or IGES file, which may be compressed with gzip.
 ///
 /// # Errors
 /// Returns an error if they begin like another format, or cannot be unpacked.
@@ -242,7 +248,7 @@ pub fn step_bytes(bytes: Vec<u8>) -> Result<Arc<[u8]>, SliceError> {
     let start = &bytes[..bytes.len().min(FORMAT_BYTES)];
     match FileFormat::of_start(start, Some(bytes.len() as u64)) {
         _ if bytes.is_empty() => Err(SliceError::EmptyFile),
-        Some(FileFormat::Part(PartFormat::Step)) | None => Ok(bytes.into()),
+        Some(FileFormat::Part(PartFormat::Step) | FileFormat::IGES) | None => Ok(bytes.into()),
         Some(format) => Err(SliceError::NotStep(format)),
     }
 }
@@ -250,17 +256,18 @@ pub fn step_bytes(bytes: Vec<u8>) -> Result<Arc<[u8]>, SliceError> {
 /// Files may nest entities to any depth.
 const STACK_BYTES: usize = 64 << 20;
 
-/// Reads the bytes of a STEP file for a report, which includes faults of bodies.
+/// Reads the bytes of a STEP or IGES file for a report, which includes faults of bodies.
 ///
 /// # Errors
-/// Returns an error if they cannot be read in time.
+/// Returns an error if they cannot be read in time, or are IGES and the kernel is not OpenCASCADE.
 pub fn read_step(bytes: Arc<[u8]>, options: &OpenOptions) -> Result<Prepared, SliceError> {
     let OpenOptions { kernel, tolerance, timeout, .. } = *options;
+    let read = kernel.read(&bytes)?;
     let (sender, receiver) = channel();
     // The work runs in its own thread, which is abandoned if it hangs.
     thread::Builder::new().stack_size(STACK_BYTES).spawn(move || {
         // Nobody is listening any more after the timeout.
-        let _ = sender.send(prepare(&bytes, kernel.read(), tolerance.mm()));
+        let _ = sender.send(prepare(&bytes, read, tolerance.mm()));
     })?;
     match receiver.recv_timeout(timeout) {
         Ok(prepared) => Ok(prepared?),

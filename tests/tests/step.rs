@@ -1,6 +1,6 @@
 //! Checks slicing, checking, converting and refusing STEP parts.
 
-use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
+use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, iges, step};
 use lamp_stack::Image;
 use lamp_tests::{Scratch, mask, masks};
 
@@ -240,6 +240,46 @@ fn what_needs_opencascade_is_refused_without_it() {
         scratch.run(line).is_wrong_usage(&["this build is without OpenCASCADE"]);
     }
     assert_eq!(scratch.names(), ["part.step"]);
+    let text = iges(StepSample::Block, StepUnit::Inch).unwrap();
+    scratch.write("part.igs", text.as_bytes());
+    for line in ["slice part.igs -o a.tif", "lamp brep part.igs"] {
+        scratch.run(line).is_refused_with(&[
+            "part.igs: this is an IGES file, which only OpenCASCADE reads",
+            "a build with --features occt",
+        ]);
+    }
+}
+
+#[cfg(feature = "occt")]
+#[test]
+fn iges_gives_the_pixels_of_the_same_step() {
+    for part in [StepSample::Block, StepSample::Frustum, StepSample::Torus] {
+        let scratch = with(part);
+        let text = iges(part, StepUnit::Inch).unwrap();
+        scratch.write("part.igs", text.as_bytes());
+        let line = "--dpi 300 --thickness 500um --rotate x:20";
+        scratch.run(&format!("slice part.step {line} --quiet -o step.tif")).succeeds();
+        let iges = format!("{line} --kernel occt --quiet");
+        scratch.run(&format!("slice part.igs {iges} -o iges.tif")).succeeds();
+        // From a pipe, too.
+        scratch.run_on(&format!("slice - {iges} -o piped.tif"), text.as_bytes()).succeeds();
+        let [step, file, pipe] =
+            ["step", "iges", "piped"].map(|name| scratch.layers(&format!("{name}.tif")));
+        assert!(masks(&step) == masks(&file) && masks(&file) == masks(&pipe), "{part:?}");
+        let report = scratch.run("lamp brep part.igs --kernel occt").succeeds().stdout;
+        assert!(String::from_utf8(report).unwrap().contains("unit:       in\n"), "{part:?}");
+        for kernel in ["lamp", "both"] {
+            scratch
+                .run(&format!("slice part.igs --kernel {kernel} -o a.tif"))
+                .is_refused_with(&["part.igs: this is an IGES file", "give --kernel occt"]);
+        }
+        let half = &text.as_bytes()[..text.len() / 2];
+        scratch.write("half.igs", half);
+        scratch
+            .run("slice half.igs --kernel occt -o a.tif")
+            .is_refused_with(&["half.igs: it is cut off"]);
+        assert!(!scratch.names().contains(&"a.tif".to_owned()));
+    }
 }
 
 #[cfg(feature = "occt")]

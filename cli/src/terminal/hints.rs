@@ -90,6 +90,7 @@ fn slicing(error: &SliceError) -> Option<String> {
         }
         SliceError::NotStep(FileFormat::Part(_)) => "slice and lamp mesh check read it",
         SliceError::NotStep(format) => return other_format(*format),
+        SliceError::Iges => IGES_KERNEL,
         SliceError::NotStl { .. } => "export the part as STL, STEP, 3MF or OBJ",
         SliceError::WildVertex { .. } => {
             "repair or export the part again, or give --trust-extent if the vertex is right"
@@ -186,6 +187,11 @@ fn of_step(error: &StepError) -> Option<String> {
     Some(hint.to_owned())
 }
 
+#[cfg(feature = "occt")]
+const IGES_KERNEL: &str = "give --kernel occt, or export the part as STL, STEP, 3MF or OBJ";
+#[cfg(not(feature = "occt"))]
+const IGES_KERNEL: &str = "export the part as STL, STEP, 3MF or OBJ, or read it with --kernel occt of a \
+     build with --features occt";
 #[cfg(feature = "occt")]
 const OTHER_KERNEL: &str = "the other --kernel may read it";
 #[cfg(not(feature = "occt"))]

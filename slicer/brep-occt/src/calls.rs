@@ -44,11 +44,17 @@ mod raw {
             heal_mm: f64,
             error: *mut Error,
         ) -> *mut Model;
+        pub(super) fn lamp_occt_read_iges(
+            path: *const c_char,
+            heal_mm: f64,
+            error: *mut Error,
+        ) -> *mut Model;
         pub(super) fn lamp_occt_free(model: *mut Model);
         pub(super) fn lamp_occt_bodies(model: *const Model) -> usize;
         pub(super) fn lamp_occt_name(model: *const Model, body: usize) -> List;
         pub(super) fn lamp_occt_unit(model: *const Model) -> List;
         pub(super) fn lamp_occt_faces(model: *const Model) -> List;
+        pub(super) fn lamp_occt_curves(model: *const Model) -> List;
         pub(super) fn lamp_occt_evaluate(
             model: *const Model,
             face: usize,
@@ -159,7 +165,20 @@ impl Model {
         // SAFETY: the bytes and the error outlive the call; nothing keeps them.
         let raw =
             unsafe { raw::lamp_occt_read(bytes.as_ptr(), bytes.len(), heal_mm, &raw mut error) };
-        let raw = NonNull::new(raw).ok_or_else(|| failed(&error))?;
+        Self::made(raw, &error)
+    }
+
+    /// Reads an IGES file, closing gaps up to a tolerance if it is above the one that the file states.
+    pub(super) fn read_iges(path: &CStr, heal_mm: f64) -> Result<Self, String> {
+        let mut error = NO_ERROR;
+        // SAFETY: the path is zero-terminated; it and the error outlive the call, and nothing keeps them.
+        let raw = unsafe { raw::lamp_occt_read_iges(path.as_ptr(), heal_mm, &raw mut error) };
+        Self::made(raw, &error)
+    }
+
+    /// Takes a model of the C++ side, or the error that it left.
+    fn made(raw: *mut raw::Model, error: &raw::Error) -> Result<Self, String> {
+        let raw = NonNull::new(raw).ok_or_else(|| failed(error))?;
         let mut model = Self { raw, faces: 0 };
         model.faces = model.faces().len();
         Ok(model)
@@ -191,6 +210,14 @@ impl Model {
         // SAFETY: the model owns the list, is alive and does not change.
         let list = unsafe { raw::lamp_occt_faces(self.raw.as_ptr()) };
         // SAFETY: it holds faces.
+        unsafe { values(self, list) }.to_vec()
+    }
+
+    /// Returns the numbers of curves and points that bound no face, of an IGES file.
+    pub(super) fn curves(&self) -> Vec<u64> {
+        // SAFETY: the model owns the list, is alive and does not change.
+        let list = unsafe { raw::lamp_occt_curves(self.raw.as_ptr()) };
+        // SAFETY: it holds numbers of this size.
         unsafe { values(self, list) }.to_vec()
     }
 

@@ -1,4 +1,4 @@
-//! STEP files read by OpenCASCADE, as a second kernel for B-rep models.
+//! STEP files read by OpenCASCADE, as a second kernel for B-rep models, and IGES files.
 //!
 //! Without the feature `occt` the crate is empty; with it, OpenCASCADE must be installed.
 //! `OcctModel` supports more surfaces and curves than `lamp_brep::StepModel`, and repairs
@@ -12,11 +12,13 @@ mod count;
 mod join;
 mod refine;
 
+use std::ffi::CString;
+use std::io::Write;
 use std::sync::Arc;
 
 use lamp_brep::{
-    Body, BrepError, FaceInfo, Jet, KernelModel, MAX_FACETS, OpenedModel, Tessellation,
-    check_syntax,
+    Body, BrepError, FaceInfo, Jet, KernelModel, MAX_FACETS, Matter, Notice, OpenedModel,
+    Tessellation, check_syntax,
 };
 
 /// A STEP file in memory, read by OpenCASCADE.
@@ -32,6 +34,7 @@ pub struct OcctModel {
     ranges: Vec<[[f64; 2]; 2]>,
     bodies: Vec<Body>,
     unit: String,
+    notices: Vec<Notice>,
 }
 
 impl OcctModel {
@@ -60,7 +63,28 @@ impl OcctModel {
     fn of(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
         // OpenCASCADE continues after invalid text, so the syntax is checked first.
         check_syntax(bytes)?;
-        let inner = calls::Model::read(bytes, heal_mm).map_err(library_error)?;
+        Ok(Self::new(calls::Model::read(bytes, heal_mm).map_err(library_error)?))
+    }
+
+    /// Reads the bytes of an IGES file. Loose faces are sewn within the resolution that the file states,
+    /// at most 0.1 mm, or within `heal_mm` if that is more. Closed shells are bodies; open ones, and faces
+    /// that meet no other, are bodies with gaps. Curves, points and drawings are left out.
+    ///
+    /// # Errors
+    /// Returns an error if they are not IGES, if a face cannot be read, or if they hold no face.
+    pub fn read_iges(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
+        check_end(bytes)?;
+        // OpenCASCADE reads IGES by the name of a file alone.
+        let file = tempfile::NamedTempFile::new().and_then(|mut file| {
+            file.write_all(bytes)?;
+            Ok(file)
+        });
+        let file = file.map_err(|error| library_error(error.to_string()))?;
+        let path = c_path(file.path())?;
+        Ok(Self::new(calls::Model::read_iges(&path, heal_mm).map_err(library_error)?))
+    }
+
+    fn new(inner: calls::Model) -> Self {
         let all = inner.faces();
         let body = |(number, name): (u32, String)| {
             let start = all.partition_point(|face| face.body < number) as u32;
@@ -70,7 +94,10 @@ impl OcctModel {
         let bodies = (0..).zip(inner.names()).map(body).collect();
         let unit = inner.unit();
         let ranges = all.iter().map(|face| face.range).collect();
-        Ok(Self { inner, faces: all.iter().map(info).collect(), ranges, bodies, unit })
+        let curves = inner.curves();
+        let notice = |&entity| Notice { entity, count: curves.len(), matter: Matter::Wire };
+        let notices = curves.first().map(notice).into_iter().collect();
+        Self { inner, faces: all.iter().map(info).collect(), ranges, bodies, unit, notices }
     }
 }
 
@@ -93,6 +120,31 @@ pub fn read(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError> {
     let model =
         if is_changed { OcctModel::read_healed(bytes, heal_mm)? } else { OcctModel::read(bytes)? };
     Ok(OpenedModel { kernel: Arc::new(model), is_changed })
+}
+
+/// Reads the bytes of an IGES file for [`prepare`](lamp_brep::prepare).
+///
+/// # Errors
+/// Returns an error if [`OcctModel::read_iges`] does.
+pub fn read_iges(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError> {
+    let model = OcctModel::read_iges(bytes, heal_mm)?;
+    Ok(OpenedModel { kernel: Arc::new(model), is_changed: heal_mm > 0.0 })
+}
+
+/// Checks that a file ends with the section that ends IGES files, whose line has its letter in column 73.
+/// OpenCASCADE reads a file that was cut off before it as if it were whole.
+fn check_end(bytes: &[u8]) -> Result<(), BrepError> {
+    let lines = bytes.trim_ascii_end().rsplit(|byte| matches!(byte, b'\n' | b'\r'));
+    match lines.into_iter().next().and_then(|line| line.get(72)) {
+        Some(b'T' | b't') => Ok(()),
+        _ => Err(BrepError::IgesEnd),
+    }
+}
+
+/// Returns a path as OpenCASCADE takes it.
+fn c_path(path: &std::path::Path) -> Result<CString, BrepError> {
+    CString::new(path.as_os_str().as_encoded_bytes())
+        .map_err(|error| library_error(error.to_string()))
 }
 
 fn info(face: &calls::Face) -> FaceInfo {
@@ -129,6 +181,10 @@ impl KernelModel for OcctModel {
 
     fn unit(&self) -> &str {
         &self.unit
+    }
+
+    fn notices(&self) -> &[Notice] {
+        &self.notices
     }
 
     fn tessellate(&self, chord_mm: f64) -> Result<Tessellation, BrepError> {

@@ -28,6 +28,8 @@ struct Sheet {
 struct LampOcctModel {
     std::string unit;
     std::vector<std::string> names;
+    // The entities of IGES that are curves or points and bound no face.
+    std::vector<uint64_t> curves;
     // The bodies, and all their faces.
     std::vector<TopoDS_Shape> bodies;
     std::vector<TopoDS_Face> faces;

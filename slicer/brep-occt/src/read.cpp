@@ -1,14 +1,20 @@
-// Reads STEP text into bodies.
+// Reads STEP text and IGES files into bodies.
 
 #include "model.hpp"
 
 #include <BRepBuilderAPI_Sewing.hxx>
 #include <BRepTools.hxx>
+#include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
 #include <GeomAdaptor_Surface.hxx>
 #include <Geom_BSplineSurface.hxx>
 #include <Geom_BezierSurface.hxx>
 #include <Geom_RectangularTrimmedSurface.hxx>
+#include <IGESControl_Controller.hxx>
+#include <IGESControl_Reader.hxx>
+#include <IGESData_GlobalSection.hxx>
+#include <IGESData_IGESEntity.hxx>
+#include <IGESData_IGESModel.hxx>
 #include <Interface_Check.hxx>
 #include <Interface_Static.hxx>
 #include <Message.hxx>
@@ -286,15 +292,33 @@ std::string unit_of(STEPControl_Reader &reader) {
 void set_up() {
     Message::DefaultMessenger()->ChangePrinters().Clear();
     STEPControl_Controller::Init();
+    IGESControl_Controller::Init();
     Interface_Static::SetCVal("xstep.cascade.unit", "MM");
 }
 
+// The settings of readers are global to the process.
+struct OneAtATime {
+    OneAtATime() : lock(mutex) {
+        static const bool is_set_up = (set_up(), true);
+        (void)is_set_up;
+    }
+    static std::mutex mutex;
+    std::lock_guard<std::mutex> lock;
+};
+std::mutex OneAtATime::mutex;
+
+// Adds a body and its faces to a model.
+void add_body(LampOcctModel &model, const TopoDS_Shape &body, const std::string &name,
+              const Said &about) {
+    const auto number = uint32_t(model.bodies.size());
+    for (TopExp_Explorer at(body, TopAbs_FACE); at.More(); at.Next())
+        add_face(model, TopoDS::Face(at.Current()), number, about);
+    model.bodies.push_back(body);
+    model.names.push_back(name);
+}
+
 LampOcctModel *read(const uint8_t *bytes, size_t count, double heal_mm, LampOcctError *error) {
-    // The settings of readers are global to the process.
-    static std::mutex reading;
-    const std::lock_guard<std::mutex> one_at_a_time(reading);
-    static const bool is_set_up = (set_up(), true);
-    (void)is_set_up;
+    const OneAtATime settings;
     Interface_Static::SetIVal("read.precision.mode", 1);
     Interface_Static::SetRVal("read.precision.val", heal_mm > 0 ? heal_mm : PRECISION_MM);
     Bytes buffer(bytes, count);
@@ -337,17 +361,142 @@ LampOcctModel *read(const uint8_t *bytes, size_t count, double heal_mm, LampOcct
     for (const auto &[item, pieces] : wholes) {
         const bool is_whole = heal_mm <= 0 || is_closed(pieces.front());
         const TopoDS_Shape joined = is_whole ? pieces.front() : sewn(pieces, heal_mm, about);
-        for (const TopoDS_Shape &part : bodies(joined)) {
-            const TopoDS_Shape body = outwards(part);
-            const auto number = uint32_t(model->bodies.size());
-            for (TopExp_Explorer at(body, TopAbs_FACE); at.More(); at.Next())
-                add_face(*model, TopoDS::Face(at.Current()), number, about);
-            model->bodies.push_back(body);
-            model->names.push_back(item.name);
-        }
+        for (const TopoDS_Shape &part : bodies(joined))
+            add_body(*model, outwards(part), item.name, about);
     }
     if (model->bodies.empty()) {
         say(error, "it holds no solid that belongs to a product");
+        return nullptr;
+    }
+    return model.release();
+}
+
+// Returns whether an entity of IGES is a face. These are bounded, trimmed, and of a solid.
+bool is_iges_face(int type) { return type == 143 || type == 144 || type == 510; }
+
+// Returns whether an entity is a curve or a point.
+bool is_iges_curve(int type) {
+    return type < 108 || (type > 108 && type < 114) || type == 116 || type == 126 || type == 130;
+}
+
+// Returns whether an entity is a curve, a surface or a solid. The others are drawings, attributes and
+// structure; 124 is a place.
+bool is_iges_shape(int type) {
+    return (type >= 100 && type < 200 && type != 124) || (type >= 500 && type < 520);
+}
+
+// Returns whether an entity is a solid: of constructive geometry, which OpenCASCADE passes over, or of
+// faces.
+bool is_iges_solid(int type) { return type >= 150 && type <= 186; }
+
+// Returns the number of an entity in the directory, by which IGES names it.
+uint64_t iges_number(int k) { return uint64_t(2 * k - 1); }
+
+std::string iges_name(int k, int type) {
+    return "D" + std::to_string(iges_number(k)) + ", of type " + std::to_string(type) + ",";
+}
+
+// Returns the error of an entity that describes shapes, or an empty string. OpenCASCADE's own words on it
+// are templates without their numbers.
+std::string unsound(const IGESData_IGESModel &model) {
+    for (int k = 1; k <= model.NbEntities(); ++k) {
+        const int type = model.Entity(k)->TypeNumber();
+        if (is_iges_shape(type) && model.Check(k, Standard_True)->NbFails() > 0)
+            return iges_name(k, type) + " has wrong numbers or references";
+    }
+    return "";
+}
+
+// Notes the entities of faces, and curves and points that bound none. Returns the first surface or solid
+// that OpenCASCADE left out, or an empty string.
+std::string note_shapes(IGESControl_Reader &reader, const IGESData_IGESModel &model,
+                        Said &about, std::vector<uint64_t> &curves) {
+    const auto process = reader.WS()->TransferReader()->TransientProcess();
+    std::unordered_map<int, bool> is_root;
+    for (int k = 1; k <= reader.NbRootsForTransfer(); ++k)
+        is_root[model.Number(reader.RootForTransfer(k))] = true;
+    for (int k = 1; k <= model.NbEntities(); ++k) {
+        const Handle(IGESData_IGESEntity) entity = model.Entity(k);
+        const int type = entity->TypeNumber();
+        const Handle(Transfer_Binder) binder = process->Find(entity);
+        const TopoDS_Shape shape =
+            binder.IsNull() ? TopoDS_Shape() : TransferBRep::ShapeResult(binder);
+        const bool has_face = !shape.IsNull() && TopExp_Explorer(shape, TopAbs_FACE).More();
+        // A surface may be a face without further ado; solids (186) are not.
+        const bool is_alone = is_root.count(k) && is_iges_shape(type) && type < 186;
+        if (has_face && (is_iges_face(type) || is_alone))
+            note(about.entities, shape, TopAbs_FACE, iges_number(k));
+        const bool is_wanted = is_iges_face(type) || is_iges_solid(type) || is_root.count(k);
+        if (has_face || !is_iges_shape(type) || !is_wanted)
+            continue;
+        if (!is_iges_curve(type))
+            return iges_name(k, type) + " cannot be read";
+        curves.push_back(iges_number(k));
+    }
+    return "";
+}
+
+// OpenCASCADE reads IGES from files alone.
+LampOcctModel *read_iges(const char *path, double heal_mm, LampOcctError *error) {
+    const OneAtATime settings;
+    // Faces of IGES are loose: the file states how far apart their edges may be.
+    Interface_Static::SetIVal("read.precision.mode", heal_mm > 0 ? 1 : 0);
+    Interface_Static::SetRVal("read.precision.val", heal_mm > 0 ? heal_mm : PRECISION_MM);
+    IGESControl_Reader reader;
+    const bool is_read = reader.ReadFile(path) == IFSelect_RetDone;
+    const auto entities = Handle(IGESData_IGESModel)::DownCast(reader.Model());
+    if (!is_read || entities.IsNull() || entities->NbEntities() == 0) {
+        say(error, "it is not an IGES file, or is cut off");
+        return nullptr;
+    }
+    std::string wrong = unsound(*entities);
+    Said about;
+    auto model = std::make_unique<LampOcctModel>();
+    if (wrong.empty()) {
+        reader.TransferRoots();
+        wrong = note_shapes(reader, *entities, about, model->curves);
+    }
+    if (!wrong.empty()) {
+        say(error, wrong.c_str());
+        return nullptr;
+    }
+    const IGESData_GlobalSection global = entities->GlobalSection();
+    const double stated_mm = global.Resolution() * global.UnitValue();
+    // Negated, so that NaN is replaced, too.
+    const double own_mm = !(stated_mm > PRECISION_MM) ? PRECISION_MM : std::min(stated_mm, 0.1);
+    model->unit = global.UnitName().IsNull() ? "" : global.UnitName()->ToCString();
+    for (char &letter : model->unit)
+        letter = char(std::tolower(static_cast<unsigned char>(letter)));
+    const TopoDS_Shape shape = reader.OneShape();
+    // Closed bodies stay as they are; all other faces are sewn.
+    std::vector<TopoDS_Shape> pieces = bodies(shape), open;
+    // Each once: groups may share faces.
+    TopTools_IndexedMapOfShape loose;
+    for (TopExp_Explorer at(shape, TopAbs_FACE, TopAbs_SHELL); at.More(); at.Next())
+        loose.Add(at.Current());
+    pieces.insert(pieces.end(), loose.cbegin(), loose.cend());
+    for (const TopoDS_Shape &piece : pieces) {
+        const TopoDS_Shape healed = heal_mm > 0 ? mended(piece, heal_mm, about) : piece;
+        const TopoDS_Shape body = healed.IsNull() ? piece : healed;
+        if (is_closed(body))
+            add_body(*model, outwards(body), "", about);
+        else
+            open.push_back(body);
+    }
+    if (!open.empty()) {
+        const TopoDS_Shape joined = sewn(open, std::max(heal_mm, own_mm), about);
+        for (const TopoDS_Shape &part : bodies(joined))
+            add_body(*model, outwards(part), "", about);
+        // A face that meets no other is a body that is open.
+        for (TopExp_Explorer at(joined, TopAbs_FACE, TopAbs_SHELL); at.More(); at.Next()) {
+            TopoDS_Shell alone;
+            BRep_Builder().MakeShell(alone);
+            BRep_Builder().Add(alone, at.Current());
+            add_body(*model, outwards(alone), "", about);
+        }
+    }
+    if (model->bodies.empty()) {
+        say(error, "it holds no face");
         return nullptr;
     }
     return model.release();
@@ -360,6 +509,10 @@ extern "C" {
 LampOcctModel *lamp_occt_read(const uint8_t *bytes, size_t count, double heal_mm,
                               LampOcctError *error) {
     return guarded(error, [&] { return read(bytes, count, heal_mm, error); });
+}
+
+LampOcctModel *lamp_occt_read_iges(const char *path, double heal_mm, LampOcctError *error) {
+    return guarded(error, [&] { return read_iges(path, heal_mm, error); });
 }
 
 void lamp_occt_free(LampOcctModel *model) { delete model; }
@@ -376,4 +529,6 @@ LampOcctList lamp_occt_unit(const LampOcctModel *model) {
 }
 
 LampOcctList lamp_occt_faces(const LampOcctModel *model) { return listed(model->infos); }
+
+LampOcctList lamp_occt_curves(const LampOcctModel *model) { return listed(model->curves); }
 }

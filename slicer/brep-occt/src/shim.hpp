@@ -68,11 +68,14 @@ struct LampOcctFault {
 
 LampOcctModel *lamp_occt_read(const uint8_t *bytes, size_t count, double heal_mm,
                               LampOcctError *error);
+// The path is zero-terminated.
+LampOcctModel *lamp_occt_read_iges(const char *path, double heal_mm, LampOcctError *error);
 void lamp_occt_free(LampOcctModel *model);
 size_t lamp_occt_bodies(const LampOcctModel *model);
 LampOcctList lamp_occt_name(const LampOcctModel *model, size_t body);
 LampOcctList lamp_occt_unit(const LampOcctModel *model);
 LampOcctList lamp_occt_faces(const LampOcctModel *model);
+LampOcctList lamp_occt_curves(const LampOcctModel *model);
 
 // Writes nine numbers to `jets` for each pair in `uv`.
 void lamp_occt_evaluate(const LampOcctModel *model, size_t face, const double *uv, size_t count,

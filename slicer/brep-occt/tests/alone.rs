@@ -1,10 +1,13 @@
 //! Checks what OpenCASCADE does differently from the other kernel, and that both agree.
 
+use std::f64::consts::PI;
 use std::fmt::Write;
 
-use lamp_brep::{BodyFault, BrepError, FaceInfo, Jet, KernelModel, StepModel, check};
-use lamp_brep_occt::OcctModel;
-use lamp_fixtures::{StepSample, StepUnit, step};
+use lamp_brep::{
+    BodyFault, BrepError, FaceInfo, Jet, KernelModel, Matter, Notice, StepModel, check, prepare,
+};
+use lamp_brep_occt::{OcctModel, read_iges};
+use lamp_fixtures::{StepSample, StepUnit, iges, step};
 
 #[test]
 fn both_kernels_say_the_same_of_bodies_and_faces() {
@@ -123,4 +126,116 @@ fn what_cannot_be_read_is_refused() {
     let endless = step(StepSample::Sphere, StepUnit::Metre).replace(",0.015);", ",1.E200);");
     let model = OcctModel::read(endless.as_bytes()).unwrap();
     assert!(matches!(model.tessellate(0.1), Err(BrepError::Size { .. })));
+}
+
+const UNITS: [(StepUnit, &str); 3] =
+    [(StepUnit::Millimetre, "mm"), (StepUnit::Metre, "m"), (StepUnit::Inch, "in")];
+
+#[test]
+fn loose_faces_of_iges_are_sewn_to_solids_in_any_unit() {
+    // A frustum of radii 15 and 7.5 mm, 30 mm high; a torus of radii 20 and 8 mm.
+    let frustum = PI / 3.0 * 30.0 * (15.0_f64.powi(2) + 15.0 * 7.5 + 7.5_f64.powi(2));
+    let torus = 2.0 * PI * PI * 20.0 * 8.0_f64.powi(2);
+    for (part, faces, volume_mm3, box_mm) in [
+        (StepSample::Block, 6, 6000.0, [[0.0; 3], [30.0, 20.0, 10.0]]),
+        (StepSample::Frustum, 3, frustum, [[-15.0, -15.0, 0.0], [15.0, 15.0, 30.0]]),
+        (StepSample::Torus, 1, torus, [[-28.0, -28.0, 0.0], [28.0, 28.0, 16.0]]),
+    ] {
+        for (unit, name) in UNITS {
+            let text = iges(part, unit).unwrap();
+            let found = prepare(text.as_bytes(), read_iges, 0.001).unwrap();
+            assert!(found.is_good() && found.heal_mm == 0.0, "{part:?}: {:?}", found.reports);
+            assert_eq!((found.kernel.unit(), found.kernel.notices()), (name, &[][..]));
+            let [report] = &found.reports[..] else { panic!("{part:?}: {:?}", found.reports) };
+            assert!((report.volume_mm3 / volume_mm3 - 1.0).abs() < 3e-4, "{part:?}: {report:?}");
+            let sides = report.box_mm.as_flattened().iter().zip(box_mm.as_flattened());
+            sides.for_each(|(a, b)| assert!((a - b).abs() < 0.002, "{part:?}: {report:?}"));
+            let numbers: Vec<_> = (0..faces).map(|face| found.kernel.face(face).entity).collect();
+            // Entities have odd numbers, and faces are trimmed or bounded surfaces.
+            assert_eq!(found.kernel.bodies()[0].faces, 0..faces);
+            for number in numbers {
+                let entry = text.lines().find(|line| line.ends_with(&format!("D{number:7}")));
+                let kind = entry.unwrap()[..8].trim();
+                assert!(["108", "144"].contains(&kind), "{part:?}: D{number} is {kind}");
+            }
+        }
+    }
+}
+
+/// Adds an entity at the end of the directory and of the parameters, and returns the text and the number
+/// of the entity.
+fn with_entity(text: &str, kind: u32, parameters: &str) -> (String, u64) {
+    let count = |section| text.lines().filter(|line| line.as_bytes()[72] == section).count();
+    let (entry, line) = (count(b'D') + 1, count(b'P') + 1);
+    let directory = format!(
+        "{kind:8}{line:8}{0:8}{0:8}{0:8}{0:8}{0:8}{0:8}{0:08}D{entry:7}\n\
+         {kind:8}{0:8}{0:8}{1:8}{0:8}{2:24}{0:8}D{3:7}\n",
+        0,
+        1,
+        "",
+        entry + 1
+    );
+    let (mut longer, mut before) = (String::new(), b'S');
+    for of_file in text.lines() {
+        let section = of_file.as_bytes()[72];
+        match (before, section) {
+            (b'D', b'P') => longer += &directory,
+            (b'P', b'T') => {
+                let parameters = format!("{kind},{parameters};");
+                writeln!(longer, "{parameters:<64}{entry:8}P{line:7}").unwrap();
+            }
+            _ => {}
+        }
+        writeln!(longer, "{of_file}").unwrap();
+        before = section;
+    }
+    (longer, entry as u64)
+}
+
+#[test]
+fn what_iges_has_besides_faces_is_named_or_refused() {
+    let text = iges(StepSample::Block, StepUnit::Millimetre).unwrap();
+    let model = OcctModel::read_iges(text.as_bytes(), 0.0).unwrap();
+    assert_eq!(model.notices(), []);
+    // An arc that bounds nothing.
+    let (with_arc, entity) = with_entity(&text, 100, "0.,0.,0.,5.,0.,5.,0.");
+    let model = OcctModel::read_iges(with_arc.as_bytes(), 0.0).unwrap();
+    let notice = Notice { entity, count: 1, matter: Matter::Wire };
+    assert_eq!((model.notices(), model.bodies().len()), (&[notice][..], 1));
+    // A block of constructive geometry.
+    let (with_block, entity) = with_entity(&text, 150, "5.,5.,5.,100.,0.,0.,1.,0.,0.,0.,0.,1.");
+    let error = OcctModel::read_iges(with_block.as_bytes(), 0.0).unwrap_err().to_string();
+    assert!(error.contains(&format!("D{entity}, of type 150, cannot be read")), "{error}");
+}
+
+#[test]
+fn broken_iges_is_refused() {
+    let said = |text: &str| OcctModel::read_iges(text.as_bytes(), 0.0).unwrap_err().to_string();
+    let text = iges(StepSample::Frustum, StepUnit::Millimetre).unwrap();
+    for end in [0, 500, text.len() / 2, text.len() - 82] {
+        assert!(said(&text[..end]).starts_with("it is cut off"), "{end}: {}", said(&text[..end]));
+    }
+    let lines: Vec<_> = text.lines().collect();
+    let last = lines.iter().rposition(|line| line.as_bytes()[72] == b'P').unwrap();
+    let short = [&lines[..last], &lines[last + 1..]].concat().join("\n");
+    assert!(said(&short).contains("has wrong numbers or references"), "{}", said(&short));
+    let none = format!("{:72}S{:7}\n{:72}T{:7}\n", "a part", 1, "S      1", 1);
+    assert!(said(&none).contains("it is not an IGES file"), "{}", said(&none));
+    // A bounded plane whose curve is no curve.
+    let k = text.find("108,").unwrap();
+    let wrong =
+        text[..k].to_owned() + &text[k..].replacen("108,0.0,0.0,1.0,", "108,0.0,0.0,0.0,", 1);
+    assert!(said(&wrong).contains("of type 108,"), "{}", said(&wrong));
+}
+
+#[test]
+fn a_missing_face_of_iges_is_a_gap() {
+    let text = iges(StepSample::Block, StepUnit::Millimetre).unwrap();
+    // The first plane gets the place of the second.
+    let planes: Vec<_> = text.match_indices("108,").map(|(at, _)| at).collect();
+    let [first, second] = [0, 1].map(|k: usize| &text[planes[k]..planes[k] + 64]);
+    let twice = text.replacen(first, second, 1);
+    assert_ne!(twice, text);
+    let prepared = prepare(twice.as_bytes(), read_iges, 0.01).unwrap();
+    assert!(!prepared.is_good(), "{:?}", prepared.reports);
 }

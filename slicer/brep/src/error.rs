@@ -17,6 +17,9 @@ pub enum BrepError {
         /// The library's message.
         message: String,
     },
+    /// The last line of an IGES file is missing.
+    #[error("it is cut off: its last line does not end an IGES file, with T in column 73")]
+    IgesEnd,
     /// The chord is not a positive length.
     #[error("a chord of {chord_mm} mm is not a positive length")]
     Chord {

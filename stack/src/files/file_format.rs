@@ -62,6 +62,11 @@ pub enum PartFormat {
     Gzip,
 }
 
+impl FileFormat {
+    /// A model in the Initial Graphics Exchange Specification, which a build with OpenCASCADE reads.
+    pub const IGES: Self = Self::Model("an IGES file");
+}
+
 impl fmt::Display for FileFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -376,7 +381,7 @@ fn of_columns(text: &[u8]) -> Option<FileFormat> {
     let number = |word: &[u8]| !word.is_empty() && word.iter().all(u8::is_ascii_digit);
     // Lines of IGES have their section's letter in column 73, then a number.
     if text.get(72) == Some(&b's') && text.get(73..80).is_some_and(|it| number(it.trim_ascii())) {
-        return Some(Model("an IGES file"));
+        return Some(FileFormat::IGES);
     }
     let mut first = words(text);
     match [first.next()?, first.next().unwrap_or_default()] {
