@@ -240,9 +240,19 @@ pub(super) fn for_each_overlap(
 #[inline]
 pub(super) fn in_step(a: &[u32], b: &[u32]) -> bool {
     // Only one of the first segments may be empty.
-    let starts_alike = (a.first() == Some(&0)) == (b.first() == Some(&0));
-    let follows = |(a, b): (&[u32], &[u32])| a[0].max(b[0]) < a[1].min(b[1]);
-    a.len() == b.len() && starts_alike && a.windows(2).zip(b.windows(2)).all(follows)
+    if a.len() != b.len() || (a.first() == Some(&0)) != (b.first() == Some(&0)) {
+        return false;
+    }
+    // Every row of every layer passes here, so the loop is plain.
+    let mut k = 1;
+    while k < a.len() {
+        let (upper, lower) = (a[k], b[k]);
+        if a[k - 1] >= lower || b[k - 1] >= upper {
+            return false;
+        }
+        k += 1;
+    }
+    true
 }
 
 /// Labels as sets: each points to a lower one of its set, the lowest to itself.

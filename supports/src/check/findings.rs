@@ -398,7 +398,7 @@ impl Findings {
         self.narrow.list.sort_by(|a, b| {
             let kind = |it: &NarrowFeature| (!it.is_white, !it.is_long());
             let width = a.width.total_cmp(&b.width);
-            kind(a).cmp(&kind(b)).then(width).then(a.layers.cmp(&b.layers))
+            kind(a).cmp(&kind(b)).then(width).then(a.layers.cmp(&b.layers)).then(a.at.cmp(&b.at))
         });
         self.off_balance.list.sort_by(|a, b| {
             b.off_pixels.total_cmp(&a.off_pixels).then(a.worst_layer.cmp(&b.worst_layer))

@@ -6,7 +6,8 @@
 //! several: a fin, a pin, a neck.
 //!
 //! Discs are tried only around chords shorter than 1.5 times the limit: a strip narrower than the limit has
-//! chords of √2 times its width along rows or along columns, at any angle.
+//! chords of √2 times its width along rows or along columns, at any angle. Most tips are corners: there, one
+//! disc near the tip, and discs from there inward, show it.
 //!
 //! Source: J. Serra, *Image Analysis and Mathematical Morphology*, 1982 (openings); T. Hildebrand and
 //! P. Rüegsegger, Journal of Microscopy 185, 1997 (the largest disc around a place as its width).
@@ -45,6 +46,9 @@ const AROUND: f64 = 3.2;
 
 /// The most rectangles of a color in which discs are tried. Dots have more, and each is narrow by design.
 const MOST_WINDOWS: usize = 2_000;
+
+/// The most tips that may turn out to be corners by a look at a few discs.
+const MOST_TIPS: u32 = 20_000;
 
 /// The most chords of a layer, which a texture of single pixels has.
 const MOST_CHORDS: usize = 2_000_000;
@@ -109,82 +113,83 @@ impl Chord {
 fn chords(mask: &Mask, least: [f64; 2]) -> Vec<Chord> {
     let [columns, rows] = least.map(|least| least.ceil().min(1e9) as u32);
     let width = mask.width();
-    let mut chords = Vec::new();
-    // The row in which each column took its color.
-    let mut since = vec![0; width as usize];
+    let mut along = Columns { since: vec![0; width as usize], least: rows, chords: Vec::new() };
     let mut above: &[u32] = &[];
+    // Every transition passes here, so these loops are plain.
     for (number, row) in (0..).zip(mask.rows()) {
-        for (k, ends) in row.windows(2).enumerate() {
-            if ends[1] - ends[0] < columns {
-                let (is_white, columns) = (k % 2 == 0, ends[0]..ends[1]);
-                chords.push(Chord {
-                    is_white,
-                    is_upright: false,
-                    columns,
-                    rows: number..number + 1,
-                });
+        let mut k = 0;
+        while k < row.len() {
+            // White may end at the border.
+            let (start, is_white) = (row[k], k % 2 == 0);
+            k += 1;
+            let end = if k < row.len() { row[k] } else { width };
+            if end - start < columns && (is_white || k < row.len()) {
+                let rows = number..number + 1;
+                let chord = Chord { is_white, is_upright: false, columns: start..end, rows };
+                along.chords.push(chord);
             }
         }
-        // White may end at the border.
-        if row.len() % 2 == 1 && width - row[row.len() - 1] < columns {
-            let columns = row[row.len() - 1]..width;
-            chords.push(Chord {
-                is_white: true,
-                is_upright: false,
-                columns,
-                rows: number..number + 1,
-            });
-        }
-        if above == row {
-            continue;
-        }
-        if number > 0 && in_step(above, row) {
-            for (k, (&upper, &lower)) in above.iter().zip(row).enumerate() {
-                // White begins at even transitions: an edge that moves right ends white there.
-                let is_white = (k % 2 == 0) == (upper < lower);
-                let columns = upper.min(lower)..upper.max(lower);
-                end(&mut since, columns, number, is_white, rows, &mut chords);
-            }
-        } else if number > 0 {
-            for_each_overlap(above, row, width, |upper, lower, columns| {
-                if (upper ^ lower) & 1 == 1 {
-                    end(&mut since, columns, number, upper & 1 == 1, rows, &mut chords);
-                }
-            });
+        if number > 0 && above != row {
+            along.end_between(above, row, width, number);
         }
         above = row;
     }
     let bottom = mask.height();
-    let mut white = 0;
-    while let (Some(&start), end_) = (above.get(white), above.get(white + 1)) {
-        let columns = start..end_.copied().unwrap_or(width);
-        end(&mut since, columns, bottom, true, rows, &mut chords);
-        white += 2;
+    for k in (0..above.len()).step_by(2) {
+        let end = if k + 1 < above.len() { above[k + 1] } else { width };
+        along.end(above[k]..end, bottom, true);
     }
-    chords
+    along.chords
 }
 
-/// Ends chords along columns above a row.
-fn end(
-    since: &mut [u32],
-    columns: Range<u32>,
-    row: u32,
-    is_white: bool,
+/// Chords along columns, as rows are passed.
+struct Columns {
+    /// The row in which each column took its color.
+    since: Vec<u32>,
+    /// The rows that a chord has fewer than.
     least: u32,
-    chords: &mut Vec<Chord>,
-) {
-    if columns.is_empty() {
-        return;
-    }
-    let mut first = columns.start;
-    for of_one in since[columns.start as usize..columns.end as usize].chunk_by(|a, b| a == b) {
-        let (start, columns) = (of_one[0], first..first + of_one.len() as u32);
-        first = columns.end;
-        if row - start < least && (is_white || start > 0) {
-            chords.push(Chord { is_white, is_upright: true, columns, rows: start..row });
+    chords: Vec<Chord>,
+}
+
+impl Columns {
+    /// Ends the chords whose color differs in the next row.
+    fn end_between(&mut self, above: &[u32], row: &[u32], width: u32, number: u32) {
+        if in_step(above, row) {
+            let mut k = 0;
+            while k < row.len() {
+                let (upper, lower) = (above[k], row[k]);
+                if upper < lower {
+                    // White begins at even transitions: an edge that moves right ends white there.
+                    self.end(upper..lower, number, k % 2 == 0);
+                } else if lower < upper {
+                    self.end(lower..upper, number, k % 2 == 1);
+                }
+                k += 1;
+            }
+        } else {
+            for_each_overlap(above, row, width, |upper, lower, columns| {
+                if (upper ^ lower) & 1 == 1 {
+                    self.end(columns, number, upper & 1 == 1);
+                }
+            });
         }
     }
-    since[columns.start as usize..columns.end as usize].fill(row);
+
+    /// Ends chords above a row.
+    fn end(&mut self, columns: Range<u32>, row: u32, is_white: bool) {
+        let mut next = columns.start;
+        while next < columns.end {
+            let (first, start) = (next, self.since[next as usize]);
+            while next < columns.end && self.since[next as usize] == start {
+                self.since[next as usize] = row;
+                next += 1;
+            }
+            if row - start < self.least && (is_white || start > 0) {
+                let (columns, rows) = (first..next, start..row);
+                self.chords.push(Chord { is_white, is_upright: true, columns, rows });
+            }
+        }
+    }
 }
 
 /// Returns the rectangles in which discs are to be tried: around chords that follow each other over
@@ -197,10 +202,9 @@ fn windows(
     metric: Metric,
 ) -> Option<Vec<Region>> {
     let mut windows = Vec::new();
-    let radius = metric.pixels(limit / 2.0);
-    for (is_upright, radius) in [(true, radius[0]), (false, radius[1])] {
+    for is_upright in [true, false] {
         let of_way = |chord: &&Chord| chord.is_white == is_white && chord.is_upright == is_upright;
-        chains(&layer.mask, chords.iter().filter(of_way).collect(), radius, &mut windows);
+        chains(&layer.mask, chords.iter().filter(of_way).collect(), limit, metric, &mut windows);
     }
     let small = metric.pixels(CHORD * limit);
     for component in layer.of_colour(is_white) {
@@ -223,8 +227,16 @@ fn around(limit: f64, metric: Metric) -> [u32; 2] {
     metric.pixels(AROUND * limit / 2.0).map(|side| side.ceil() as u32 + 2)
 }
 
-/// Adds the rectangles of chords that follow each other over enough lines, given a disc's radius in lines.
-fn chains(mask: &Mask, mut chords: Vec<&Chord>, radius: f64, windows: &mut Vec<Region>) {
+/// Adds the rectangles of chords that follow each other over enough lines.
+fn chains(
+    mask: &Mask,
+    mut chords: Vec<&Chord>,
+    limit: f64,
+    metric: Metric,
+    windows: &mut Vec<Region>,
+) {
+    let Some(chord) = chords.first() else { return };
+    let radius = metric.pixels(limit / 2.0)[usize::from(!chord.is_upright)];
     let key = |chord: &Chord| chord.lines().map(|range| range.start);
     chords.sort_unstable_by_key(|chord| key(chord));
     // A chord follows the chords that end where it begins, and that it overlaps.
@@ -258,21 +270,20 @@ fn chains(mask: &Mask, mut chords: Vec<&Chord>, radius: f64, windows: &mut Vec<R
             unite(&mut parents, before, at);
         }
     }
-    // The first and the last chord of each chain, and the rectangle around all.
-    let mut chains: Vec<Option<([&Chord; 2], Region)>> = vec![None; chords.len()];
-    for (at, chord) in (0..).zip(&chords) {
-        let region = Region { columns: chord.columns.clone(), rows: chord.rows.clone() };
-        match &mut chains[root(&mut parents, at) as usize] {
-            Some(([_, last], whole)) => {
-                whole.unite(&region);
-                if chord.lines()[0].end > last.lines()[0].end {
-                    *last = chord;
-                }
-            }
-            none => *none = Some(([chord; 2], region)),
-        }
-    }
-    for ([first, last], region) in chains.into_iter().flatten() {
+    let mut of_chains: Vec<(u32, u32)> =
+        (0..chords.len() as u32).map(|at| (root(&mut parents, at), at)).collect();
+    of_chains.sort_unstable();
+    let (mut chain, mut tips): (Vec<&Chord>, _) = (Vec::new(), 0);
+    for of_chain in of_chains.chunk_by(|a, b| a.0 == b.0) {
+        chain.clear();
+        chain.extend(of_chain.iter().map(|(_, at)| chords[*at as usize]));
+        let first = chain[0];
+        let last = chain.iter().copied().rev().max_by_key(|chord| chord.lines()[0].end);
+        let last = last.unwrap_or(first);
+        let region_of =
+            |chord: &Chord| Region { columns: chord.columns.clone(), rows: chord.rows.clone() };
+        let mut region = region_of(first);
+        chain[1..].iter().for_each(|chord| region.unite(&region_of(chord)));
         let lines = [first.lines()[0].start, last.lines()[0].end];
         let extent = f64::from(lines[1] - lines[0]);
         if extent < LEAST_NECK * radius {
@@ -291,10 +302,57 @@ fn chains(mask: &Mask, mut chords: Vec<&Chord>, radius: f64, windows: &mut Vec<R
         };
         let ends = [goes_on(lines[0].checked_sub(1), first), goes_on(Some(lines[1]), last)];
         // A chain of two tips is a pin, and all that is narrower is its rest.
-        if ends[0] == ends[1] || extent >= LEAST_TIP * radius {
+        let is_narrow = ends[0] == ends[1] || {
+            if ends[0] {
+                chain.reverse();
+            }
+            let has_reach = extent >= LEAST_TIP * radius;
+            tips += u32::from(has_reach);
+            has_reach && (tips > MOST_TIPS || !is_corner_of_discs(mask, &chain, limit, metric))
+        };
+        if is_narrow {
             windows.push(region);
         }
     }
+}
+
+/// Returns whether discs fill a chain of chords, given from its tip, but for what a corner leaves: one near
+/// its tip, and all from there to its other end.
+fn is_corner_of_discs(mask: &Mask, chords: &[&Chord], limit: f64, metric: Metric) -> bool {
+    let is_white = chords[0].is_white;
+    let radius = limit / 2.0 - DISC_SLACK;
+    let farthest = (1.0 + REACH) * radius - 2.0 * metric.longer_side();
+    let middle = |chord: &Chord| {
+        [&chord.columns, &chord.rows].map(|range| f64::from(range.start + range.end) / 2.0)
+    };
+    let tip = middle(chords[0]);
+    let mut next = None;
+    for (at, pair) in chords.windows(2).enumerate() {
+        let [a, b] = [0, 1].map(|k| pair[k].lines()[0]);
+        // Branches have tips of their own.
+        if a.end != b.start && b.end != a.start {
+            return false;
+        }
+        let [x, y] = metric.place([0, 1].map(|k| middle(pair[1])[k] - tip[k]));
+        if x.hypot(y) <= farthest {
+            next = Some(at + 1);
+        }
+    }
+    let Some(first) = next else { return false };
+    let step = (STEP * radius).max(1.0) as usize;
+    let tried = (first..chords.len()).step_by(step).chain([chords.len() - 1]);
+    let least = radius + 0.5 * metric.longer_side();
+    let holds = |place, least| clearance(mask, is_white, place, metric) >= least;
+    tried.into_iter().all(|at| {
+        let place = middle(chords[at]);
+        // Farther from the tip, a blunt corner has more room.
+        let away = [0, 1].map(|k| place[k] - tip[k]);
+        let [x, y] = metric.place(away);
+        let share = farthest / x.hypot(y).max(1.0);
+        let beyond = [0, 1].map(|k| tip[k] + share * away[k]);
+        // A disc there has no black up to here.
+        holds(place, least) || (share > 1.0 && holds(beyond, least.max(farthest - x.hypot(y))))
+    })
 }
 
 /// Unites rectangles until none is within so many columns and rows of another.
@@ -492,7 +550,7 @@ fn width(
         }
         let mut here = runs[next..].iter().take_while(|(row, _)| *row == of_row);
         if here.any(|(_, run)| f64::from(run.start) <= column && column <= f64::from(run.end)) {
-            discs.push(([column, row], clearance(own, [column, row], metric)));
+            discs.push(([column, row], clearance(own, true, [column, row], metric)));
         }
         if next == runs.len() {
             break;
@@ -523,9 +581,9 @@ fn width(
     Some((width, widths[widths.len() / 2].0, at))
 }
 
-/// Returns the distance of a point, as column and row, from the nearest black pixel's center, less half
-/// a pixel: the distance from an edge along rows or columns. In widths of a pixel.
-fn clearance(mask: &Mask, [column, row]: [f64; 2], metric: Metric) -> f64 {
+/// Returns the distance of a point of a color, as column and row, from the nearest center of a pixel of the
+/// other color, less half a pixel: the distance from an edge along rows or columns. In widths of a pixel.
+fn clearance(mask: &Mask, is_white: bool, [column, row]: [f64; 2], metric: Metric) -> f64 {
     let mut nearest = (f64::INFINITY, 0.0);
     let own = row.floor() as i64;
     for away in 0..i64::from(mask.height()) {
@@ -540,7 +598,9 @@ fn clearance(mask: &Mask, [column, row]: [f64; 2], metric: Metric) -> f64 {
             let Some(number) = u32::try_from(of_row).ok().filter(|row| *row < mask.height()) else {
                 continue;
             };
-            let Some(aside) = aside(mask.row(number), mask.width(), column) else { continue };
+            let Some(aside) = aside(mask.row(number), is_white, mask.width(), column) else {
+                continue;
+            };
             let distance = aside.hypot(down);
             if distance < nearest.0 {
                 let [_, half] = metric.place([0.0, 0.5]);
@@ -555,16 +615,16 @@ fn clearance(mask: &Mask, [column, row]: [f64; 2], metric: Metric) -> f64 {
     (nearest.0 - nearest.1).max(0.0)
 }
 
-/// Returns the distance in a row from a point to the center of the nearest black pixel; none if the row
-/// is white.
-fn aside(row: &[u32], width: u32, column: f64) -> Option<f64> {
+/// Returns the distance in a row from a point to the center of the nearest pixel of the other color; none if
+/// there is none.
+fn aside(row: &[u32], is_white: bool, width: u32, column: f64) -> Option<f64> {
     let at = (column.floor().max(0.0) as u32).min(width - 1);
     let passed = row.partition_point(|&t| t <= at);
-    if passed % 2 == 0 {
+    if (passed % 2 == 1) != is_white {
         return Some((f64::from(at) + 0.5 - column).abs());
     }
-    let start = row[passed - 1];
-    let left = (start > 0).then(|| column - (f64::from(start) - 0.5));
+    let start = passed.checked_sub(1).map(|before| row[before]).filter(|start| *start > 0);
+    let left = start.map(|start| column - (f64::from(start) - 0.5));
     let right = row.get(passed).map(|&end| f64::from(end) + 0.5 - column);
     left.into_iter().chain(right).reduce(f64::min)
 }
@@ -612,7 +672,7 @@ mod tests {
                         x.hypot(y)
                     });
                     let nearest = nearest.fold(f64::INFINITY, f64::min);
-                    let found = clearance(&mask, point, metric);
+                    let found = clearance(&mask, true, point, metric);
                     // Half a pixel less, which is as long as the direction has it.
                     let half: [f64; 2] = [0.5, 0.5 * height];
                     let [least, most] = [half[0].min(half[1]), half[0].max(half[1])];
