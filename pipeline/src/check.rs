@@ -4,23 +4,25 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::num::{NonZeroU8, NonZeroU32};
 use std::path::PathBuf;
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use lamp_machine::{Machine, Recoating};
 use lamp_stack::{Layer, Length, Mask, MemorySize};
 use lamp_supports::{
     AcceptedFindings, CheckError, CheckOptions, CopyRecord, DesignRules, Disagreements, Feature,
-    FindingGroup, FindingRecord, Findings, LeastWidth, Listed, Region, Scale, Severity, WidthRule,
+    FindingGroup, FindingRecord, Findings, LayerFacts, LayerLight, LeastWidth, Listed, Region,
+    Scale, Severity,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::build_copies::{BuildCopies, Inseparable, OnBuild};
 use crate::documents::{canonical_word, document, is_file};
 use crate::error::Error;
+use crate::stack_light::{NoLight, StackLight};
 use crate::words::{list, optional, path, text, words_of};
 
 /// Changes when other findings come of the same settings and stack.
-pub const CODE: u32 = 3;
+pub const CODE: u32 = 4;
 
 /// The findings to look for, and their limits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,15 +97,20 @@ impl CheckSettings {
         document(&self.machine)
     }
 
-    /// Returns the options of the search for findings.
+    /// Returns the options of the search for findings, given the light of layers.
     ///
     /// # Errors
     /// Returns an error if the file of the design rules cannot be read, or holds none.
-    pub fn options(&self) -> Result<CheckOptions, Error> {
+    pub fn options(&self, light: Option<StackLight>) -> Result<CheckOptions, Error> {
         let rules: Option<DesignRules> =
             self.reports(FindingGroup::Rules).then(|| document(&self.rules)).transpose()?;
+        let widths = rules.iter().flat_map(DesignRules::widths).collect();
+        let (bonds, aspects) = rules.map(|rules| (rules.bond, rules.aspect)).unwrap_or_default();
         Ok(CheckOptions {
-            widths: rules.iter().flat_map(DesignRules::widths).collect(),
+            widths,
+            bonds,
+            aspects,
+            light: light.map(|light| Arc::new(light) as Arc<dyn LayerLight>),
             threshold: self.threshold,
             speck: self.speck,
             speck_layers: self.speck_layers,
@@ -132,8 +139,8 @@ impl CheckSettings {
         records
     }
 
-    /// Finds what there is in a stack, given its layers and how to decode one. Of a build, whose copies
-    /// are given, each part is judged once. Drag is computed for `machine`, or else for the settings'
+    /// Finds what there is in a stack, given the light of its layers, these and how to decode one. Of a
+    /// build, whose copies are given, each part is judged once. Drag is computed for `machine`, or else for the settings'
     /// machine.
     ///
     /// # Errors
@@ -141,11 +148,13 @@ impl CheckSettings {
     pub fn find<T: MemorySize + Send, E: From<CheckError> + From<Error> + Send>(
         &self,
         build: Result<BuildCopies, Inseparable>,
+        light: Result<StackLight, NoLight>,
         layers: impl Iterator<Item = Result<T, E>>,
         decode: impl Fn(T) -> Result<Layer, E> + Sync,
         machine: Option<&Machine>,
     ) -> Result<Found, E> {
-        let options = self.options()?;
+        let (light, no_light) = known(light);
+        let options = self.options(light)?;
         let (findings, differing) = match &build {
             Ok(build) => self.find_in_build(build, layers, decode, &options)?,
             Err(_) => (lamp_supports::check(layers, decode, &options)?, Vec::new()),
@@ -158,7 +167,7 @@ impl CheckSettings {
                 &of_settings
             }
         };
-        Ok(self.found(findings, &Disagreements::default(), differing, build, machine))
+        Ok(self.found(findings, &Disagreements::default(), differing, build, no_light, machine))
     }
 
     /// Returns what was found, as people and programs read it.
@@ -168,6 +177,7 @@ impl CheckSettings {
         disagreements: &Disagreements,
         differing: Vec<CopyRecord>,
         build: Result<BuildCopies, Inseparable>,
+        no_light: Option<NoLight>,
         machine: &Machine,
     ) -> Found {
         let mut records = self.records(&findings, disagreements, machine);
@@ -182,7 +192,8 @@ impl CheckSettings {
             let at = at.unwrap_or(records.len());
             records.splice(at..at, differing);
         }
-        let mut found = Found { findings, records, features: Vec::new(), accepted: 0, build };
+        let mut found =
+            Found { findings, records, features: Vec::new(), accepted: 0, build, no_light };
         found.group();
         found
     }
@@ -278,6 +289,16 @@ pub struct Found {
     pub accepted: usize,
     /// The copies of a build, or why the stack was checked as it stands.
     pub build: Result<BuildCopies, Inseparable>,
+    /// Why the light of layers is not known, if it is not.
+    pub no_light: Option<NoLight>,
+}
+
+/// Returns the light, or why it is not known.
+pub fn known(light: Result<StackLight, NoLight>) -> (Option<StackLight>, Option<NoLight>) {
+    match light {
+        Ok(light) => (Some(light), None),
+        Err(why) => (None, Some(why)),
+    }
 }
 
 /// A finding, and the part of a build that it belongs to.
@@ -336,23 +357,57 @@ impl Found {
         Some(format!("each copy and the build mesh were checked as they stand: {why}"))
     }
 
-    /// Returns why design rules were not checked, in all layers or in some.
-    pub fn unchecked_rules(&self) -> Option<String> {
-        let textures = self.findings.layers.iter().filter(|layer| layer.is_texture).count();
+    /// Returns sentences on design rules that were not checked, in all layers or in some.
+    pub fn unchecked_rules(&self) -> Vec<String> {
+        let Findings { layers, pitch, widths, bonds, aspects, .. } = &self.findings;
+        let mut notes = Vec::new();
+        let textures = layers.iter().filter(|layer| layer.is_texture).count();
         if textures > 0 {
-            let layers = if textures == 1 { "layer" } else { "layers" };
-            return Some(format!(
-                "design rules were not checked in {textures} {layers} with thousands of narrow places, \
-                 as dots are"
+            let plural = if textures == 1 { "layer" } else { "layers" };
+            notes.push(format!(
+                "rules of widths were not checked in {textures} {plural} with thousands of narrow \
+                 places, as dots are"
             ));
         }
-        let needs_length = |rule: &&WidthRule| matches!(rule.least, LeastWidth::Length(_));
-        let rules = self.findings.widths.iter().filter(needs_length);
-        let names: Vec<&str> = rules.map(|rule| rule.name.as_str()).collect();
-        (self.findings.pitch.is_none() && !names.is_empty()).then(|| {
-            let names = names.join(", ");
-            format!("design rules were not checked, as the stack states no resolution: {names}")
-        })
+        let mut unchecked = |names: Vec<&str>, why: &str| {
+            if !names.is_empty() {
+                let names = names.join(", ");
+                notes.push(format!("design rules were not checked: {names}; {why}"));
+            }
+        };
+        let of_light = widths.iter().filter(|it| matches!(it.least, LeastWidth::CureWidths(_)));
+        let of_light: Vec<&str> = of_light.map(|rule| rule.name.as_str()).collect();
+        if pitch.is_none() {
+            let lengths = widths.iter().filter(|it| matches!(it.least, LeastWidth::Length(_)));
+            let lengths = lengths.map(|rule| rule.name.as_str()).chain(of_light.iter().copied());
+            let all = lengths.chain(aspects.iter().map(|rule| rule.name.as_str())).collect();
+            unchecked(all, "the stack states no resolution");
+        } else if !layers.iter().any(|layer| layer.thickness_um.is_some()) {
+            let names = aspects.iter().map(|rule| rule.name.as_str()).collect();
+            unchecked(names, "the stack states no heights");
+        }
+        let of_bonds: Vec<&str> = bonds.iter().map(|rule| rule.name.as_str()).collect();
+        if let Some(NoLight(why)) = &self.no_light {
+            let of_light = of_light.iter().copied().filter(|_| pitch.is_some());
+            unchecked(of_light.chain(of_bonds).collect(), why);
+            return notes;
+        }
+        let white = || layers.iter().filter(|layer| layer.has_white);
+        let mut lacking = |names: &[&str], has: &dyn Fn(&LayerFacts) -> bool, what: &str| {
+            let (without, all) = (white().filter(|layer| !has(layer)).count(), white().count());
+            if without > 0 {
+                let which =
+                    if without == all { "layers".into() } else { format!("{without} layers") };
+                unchecked(names.to_vec(), &format!("neither {which} nor the resin state {what}"));
+            }
+        };
+        if pitch.is_some() {
+            lacking(&of_light, &|layer| layer.cure.width_um.is_some(), "a dose and its cure width");
+        }
+        let has_depth =
+            |layer: &LayerFacts| layer.cure.depth_um.is_some() && layer.thickness_um.is_some();
+        lacking(&of_bonds, &has_depth, "a dose and its cure depth, and a thickness");
+        notes
     }
 
     /// Returns the line about a feature, without the name of its kind.

@@ -44,6 +44,7 @@ mod ranges;
 mod recorded_part;
 mod slice_settings;
 mod sliced_part;
+mod stack_light;
 mod survey;
 mod wall_report;
 
@@ -56,5 +57,6 @@ pub use ranges::ranges;
 pub use recorded_part::RecordedSlicing;
 pub use slice_settings::{GrayRule, SliceFrame, SliceSettings, SlicingRecord, Thickness};
 pub use sliced_part::{LayersOfPart, SlicedPart, check_slicing};
+pub use stack_light::{NoLight, StackLight};
 pub use survey::Survey;
 pub use wall_report::{NarrowedWall, WallHead, WallReport};

@@ -1,9 +1,11 @@
 //! Checks of layers.
 
+use std::path::Path;
+
 use lamp_machine::Recoating;
-use lamp_pipeline::Error;
 use lamp_pipeline::build_copies::{BuildCopies, Inseparable};
 use lamp_pipeline::check::{CheckSettings, Found};
+use lamp_pipeline::{Error, StackLight};
 use lamp_stack::PassingLayer;
 use lamp_supports::{CheckError, FindingRecord, IslandRecord, Scale};
 use pyo3::prelude::*;
@@ -30,12 +32,15 @@ pub(crate) fn check<'py>(
         let mut found = Value::Null;
         let reports = chain.run(work, false, &mut |layers| {
             let mut layers = layers.peekable();
-            let build = match layers.peek() {
-                Some(Ok(first)) => BuildCopies::of(first.info(), first.size()),
-                _ => Err(Inseparable::NoBuild),
+            let first = layers.peek().and_then(|first| first.as_ref().ok());
+            let build = match first {
+                Some(first) => BuildCopies::of(first.info(), first.size()),
+                None => Err(Inseparable::NoBuild),
             };
+            let light = StackLight::of_stack(first.map(|it| it.info()), &[Path::new("")]);
             let result = settings.find(
                 build,
+                light,
                 layers,
                 |layer: PassingLayer| Ok(layer.decode()?),
                 Some(&machine),

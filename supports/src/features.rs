@@ -320,6 +320,7 @@ impl Size {
             FindingRecord::WeakJoint(joint) => joint.area.area_px,
             FindingRecord::Overhang(overhang) => overhang.area.area_px,
             FindingRecord::Thin(narrow) | FindingRecord::Slot(narrow) => narrow.length_px as u64,
+            FindingRecord::Slender(slender) => slender.length_px as u64,
             FindingRecord::Trap(pocket)
             | FindingRecord::Cup(pocket)
             | FindingRecord::Sealed(pocket)
@@ -336,6 +337,9 @@ impl Size {
         let (mut held_at, mut is_loose) = (None, false);
         if let FindingRecord::Thin(narrow) | FindingRecord::Slot(narrow) = record {
             (sides, is_loose) = ([narrow.width_px.round() as u32, 0], true);
+        }
+        if let FindingRecord::Slender(slender) = record {
+            (sides, is_loose) = ([slender.width_px.round() as u32, 0], true);
         }
         if let FindingRecord::Overhang(overhang) = record {
             sides = [overhang.reach_px.round() as u32, 0];

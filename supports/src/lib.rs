@@ -29,19 +29,20 @@ mod record;
 mod support;
 
 pub use check::{
-    CheckError, CheckOptions, DesignRules, Disagreements, Findings, HeldAt, Island, IslandEnd,
-    IslandMinimum, LayerFacts, LeastWidth, LeastWidthRule, Listed, LoneMinimum, NarrowFeature,
-    OffBalance, Overhang, Pocket, PocketEffect, PocketKind, Region, RuleError, WeakJoint,
-    WidthRule, check, check_build, component_at, components_beyond, inner_components,
+    AspectRule, BondRule, CheckError, CheckOptions, DesignRules, Disagreements, Findings, HeldAt,
+    Island, IslandEnd, IslandMinimum, LayerCure, LayerFacts, LayerLight, LeastWidth,
+    LeastWidthRule, Listed, LoneMinimum, NarrowFeature, OffBalance, Overhang, Pocket, PocketEffect,
+    PocketKind, Region, RuleError, SlenderFeature, WeakBond, WeakJoint, WidthRule, check,
+    check_build, component_at, components_beyond, inner_components,
 };
 pub use features::{Feature, Severity, features};
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use record::{
-    AcceptedFindings, AreaRecord, BorderRecord, BoxRecord, CopyRecord, DoubtfulIslandRecord,
-    EmptyPlace, EmptyRecord, FindingGroup, FindingRecord, FoundPixels, IslandRecord, Joined,
-    JointRecord, LayerPlace, LayerSpan, MinimumRecord, NarrowRecord, OffBalanceRecord,
-    OverhangRecord, PartWord, PocketRecord, PointRecord, Scale, Shown, ShownMoment,
-    StrayRowsRecord, records,
+    AcceptedFindings, AreaRecord, BondRecord, BorderRecord, BoxRecord, CopyRecord,
+    DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingGroup, FindingRecord, FoundPixels,
+    IslandRecord, Joined, JointRecord, LayerPlace, LayerSpan, MinimumRecord, NarrowRecord,
+    OffBalanceRecord, OverhangRecord, PartWord, PocketRecord, PointRecord, Scale, Shown,
+    ShownMoment, SlenderRecord, StrayRowsRecord, records,
 };
 pub use support::{
     AvoidError, AvoidedBox, AvoidedSurface, Braces, HeldPlace, IslandPlan, PillarSizes, Rejection,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use lamp_batch::{Call, WriteLayers};
 use lamp_build::TILE_CODE;
+use lamp_pipeline::StackLight;
 use lamp_pipeline::build_copies::BuildCopies;
 use lamp_pipeline::check::{self, CheckSettings};
 use lamp_pipeline::watcher::KeptRemarks;
@@ -120,9 +121,11 @@ impl Checking {
         let failed = |error: StackError| Exit::Failed(error.into()).at(name.clone());
         let mut pages =
             Pages::open(stack).map_err(failed)?.map(|page| page.map_err(failed)).peekable();
-        let build = BuildCopies::of_page(pages.peek().and_then(|page| page.as_ref().ok()), 0);
+        let first = pages.peek().and_then(|page| page.as_ref().ok());
+        let build = BuildCopies::of_page(first, 0);
+        let light = StackLight::of_stack(first.map(Page::info), &[]);
         let decode = |page: Page| page.decode().map_err(failed);
-        let all = self.0.find(build, pages, decode, None).map_err(|error: Exit| {
+        let all = self.0.find(build, light, pages, decode, None).map_err(|error: Exit| {
             // Errors of pages have their place.
             match error.cause::<CheckError>() {
                 Some(_) => error.at(name.clone()),

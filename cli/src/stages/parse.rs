@@ -293,7 +293,7 @@ pub(crate) fn parse_check(options: &[String], folder: &Path) -> Result<CheckSett
     settings.rules = placed::<DesignRules>(&settings.rules, folder);
     // A slip in their files must show before the night.
     settings.machine().map_err(|error| Exit::from(error).to_string())?;
-    settings.options().map_err(|error| Exit::from(error).to_string())?;
+    settings.options(None).map_err(|error| Exit::from(error).to_string())?;
     Ok(settings)
 }
 

@@ -12,7 +12,7 @@ pub use measured_doses::MeasuredDoses;
 use crate::calibrate::ExposureTimes;
 use crate::material::{Material, ResinError};
 use crate::resin::{
-    CureError, CureModel, Dose, ExposureTime, Intensity, broadening_depth, depth_levels,
+    CureError, CureModel, Dose, ExposureTime, Intensity, WidthLine, broadening_depth, depth_levels,
 };
 
 /// The exposure of layers by their thickness.
@@ -146,9 +146,32 @@ impl Exposure {
     /// # Errors
     /// Returns an error if the material gives no dose of the layer.
     pub fn layers_cured(&self, thickness: Length) -> Result<Option<f64>, ExposureError> {
+        let depth = self.dose(thickness)?.and_then(|dose| self.depth(dose));
+        Ok(depth.map(|depth| depth.um() / thickness.um()))
+    }
+
+    /// Returns the dose of full white in a layer. A table of times does not say it.
+    ///
+    /// # Errors
+    /// Returns an error if the material gives no dose of the layer.
+    pub fn dose(&self, thickness: Length) -> Result<Option<Dose>, ExposureError> {
         let Rule::Resin(curing) = &self.rule else { return Ok(None) };
-        let depth = curing.model.depth(curing.white(thickness)?);
-        Ok(Some(depth.um() / thickness.um()))
+        curing.white(thickness).map(Some)
+    }
+
+    /// Returns how deep a dose of full white cures. A table of times does not say it.
+    pub fn depth(&self, dose: Dose) -> Option<Length> {
+        match &self.rule {
+            Rule::Resin(curing) => Some(curing.model.depth(dose)),
+            Rule::Table(_) => None,
+        }
+    }
+
+    /// Returns the broadening depth, from which the edges of the largest features grow (002 eq. 61), if the
+    /// material says it.
+    pub fn broadening_depth(&self) -> Option<Length> {
+        let Rule::Resin(curing) = &self.rule else { return None };
+        Some(broadening_depth(&*curing.model, curing.width_line()?.critical_dose))
     }
 
     /// Returns the depth that full white is to cure, in layers, unless a table of times decides.
@@ -249,12 +272,7 @@ impl Exposure {
                 layers(least)
             )
         });
-        // 002 section 3.4.4: widths level off at large sizes.
-        let widths = curing.material.cure_widths().ok().flatten();
-        let lines = widths.iter().flatten().filter_map(|width| width.lines().last().copied());
-        let line = lines
-            .min_by(|a, b| a.critical_dose.mj_per_cm2().total_cmp(&b.critical_dose.mj_per_cm2()));
-        let grows = line.and_then(|line| {
+        let grows = curing.width_line().and_then(|line| {
             let growth =
                 cured.iter().filter_map(|(um, _)| Some(line.width(curing.white(*um).ok()?)));
             let most = growth.map(Length::um).fold(0.0, f64::max);
@@ -280,6 +298,14 @@ impl Exposure {
 }
 
 impl Curing {
+    /// Returns how the largest features grow, from the least dose, if the material says it.
+    fn width_line(&self) -> Option<WidthLine> {
+        // 002 section 3.4.4: widths level off at large sizes.
+        let widths = self.material.cure_widths().ok().flatten();
+        let lines = widths.iter().flatten().filter_map(|width| width.lines().last().copied());
+        lines.min_by(|a, b| a.critical_dose.mj_per_cm2().total_cmp(&b.critical_dose.mj_per_cm2()))
+    }
+
     fn light(&self) -> Result<Intensity, ResinError> {
         self.light.ok_or_else(|| ResinError::NoLight(self.material.name.clone()))
     }

@@ -355,6 +355,33 @@ impl Material {
         CureWidth::new(lines).map_err(of("cure-width"))
     }
 
+    /// Returns how far the edges of the largest features grow along x and y at a dose, under many layers of
+    /// this thickness above; `None` if the material, or a thickness that it needs, does not say it.
+    ///
+    /// # Errors
+    /// Returns an error if numbers are impossible.
+    pub fn edge_growth(
+        &self,
+        dose: Dose,
+        thickness: Option<Length>,
+    ) -> Result<Option<[Length; 2]>, MaterialError> {
+        let widths = self.cure_widths()?;
+        let has_directions = self.spread()?.is_some_and(|spread| spread.sigma().is_none());
+        // As in compensation: squares measure one cure width for all directions.
+        if let Some(light) = self.edge_light()?.filter(|_| has_directions || widths.is_none()) {
+            return Ok(light.edges(dose));
+        }
+        let Some(widths) = widths else { return Ok(None) };
+        let times = match (&self.many_layers, thickness) {
+            (None, _) => 1.0,
+            (Some(_), Some(thickness)) => self.many_layers(thickness)?,
+            (Some(_), None) => return Ok(None),
+        };
+        let dose = Dose::from_mj_per_cm2(dose.mj_per_cm2() * times);
+        // 002 section 3.4.4: beyond the largest size widths stay.
+        Ok(Some(widths.map(|width| width.width(dose, Length::from_um(f64::MAX)))))
+    }
+
     /// Returns how many times its own dose counts for the cure width of a layer with many layers above
     /// it: their doses fade by `q = exp(-thickness/D_p)` a layer, and sum to `1/(1 - q)` (002 section
     /// 3.4.8 a, as `lamp cure` adds doses up), of which a share counts. 1 if the material does not say it.

@@ -41,17 +41,8 @@ impl Weight {
 impl Base {
     /// Starts a body from components of the first layer.
     pub(super) fn of(layer: &Labelled, components: &[u32]) -> Self {
-        let mut corners = Vec::new();
-        for &component in components {
-            for (row, columns) in layer.components.runs(&layer.mask, component) {
-                // A pixel stands on all of its area: the hull is of corners, not of centers.
-                let [top, bottom] = [row, row + 1].map(i64::from);
-                let [left, right] = [columns.start, columns.end].map(i64::from);
-                corners.extend([[left, top], [right, top], [left, bottom], [right, bottom]]);
-            }
-        }
         let region = layer.components.all[components[0] as usize].region();
-        Self { hull: convex_hull(corners), region, weight: Weight::default(), off: None }
+        Self { hull: hull_of(layer, components), region, weight: Weight::default(), off: None }
     }
 
     /// Joins another body to this one.
@@ -109,9 +100,23 @@ impl Base {
     }
 }
 
+/// Returns the convex hull of components: corners of pixels, counter-clockwise where y grows.
+pub(super) fn hull_of(layer: &Labelled, components: &[u32]) -> Vec<[i64; 2]> {
+    let mut corners = Vec::new();
+    for &component in components {
+        for (row, columns) in layer.components.runs(&layer.mask, component) {
+            // A pixel stands on all of its area: the hull is of corners, not of centers.
+            let [top, bottom] = [row, row + 1].map(i64::from);
+            let [left, right] = [columns.start, columns.end].map(i64::from);
+            corners.extend([[left, top], [right, top], [left, bottom], [right, bottom]]);
+        }
+    }
+    convex_hull(corners)
+}
+
 /// Returns the convex hull of points, counter-clockwise, without points on its sides (Andrew's
 /// monotone chain).
-fn convex_hull(mut points: Vec<[i64; 2]>) -> Vec<[i64; 2]> {
+pub(super) fn convex_hull(mut points: Vec<[i64; 2]>) -> Vec<[i64; 2]> {
     points.sort_unstable();
     points.dedup();
     if points.len() < 3 {

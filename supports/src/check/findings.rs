@@ -6,7 +6,7 @@ use std::ops::Range;
 use lamp_stack::{PageInfo, Pitch};
 use serde::{Deserialize, Serialize};
 
-use super::WidthRule;
+use super::{AspectRule, BondRule, WidthRule};
 
 /// A rectangle of pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -237,6 +237,8 @@ pub struct NarrowFeature {
     /// The least width of a layer in widths of a pixel: of each layer, the width that a tenth of its
     /// middle line is below or at.
     pub width: f64,
+    /// The least width by the rule there, in widths of a pixel.
+    pub limit: f64,
     /// The first layer that is so narrow.
     pub narrowest_layer: u32,
     /// A pixel of that layer that has the width, as column and row.
@@ -251,12 +253,60 @@ pub struct NarrowFeature {
 
 impl NarrowFeature {
     /// How often a wall or a slot is as long as wide, at least.
-    const ELONGATED: f64 = 3.0;
+    pub(super) const ELONGATED: f64 = 3.0;
 
     /// Returns whether it is a wall or a slot, and no pin or hole.
     pub fn is_long(&self) -> bool {
         self.length >= Self::ELONGATED * self.width
     }
+}
+
+/// A pin or a hole that is longer for its width than a design rule allows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlenderFeature {
+    /// Whether it is white: a pin, and no hole.
+    pub is_white: bool,
+    /// The number of the rule that it breaks, in the options.
+    pub rule: usize,
+    /// The first and the last layer.
+    pub layers: [u32; 2],
+    /// Its length along the middles of its layers, in widths of a pixel.
+    pub length: f64,
+    /// The width of its widest layer, in widths of a pixel: the least distance of two parallel lines that
+    /// hold it.
+    pub width: f64,
+    /// The first layer that is so wide.
+    pub widest_layer: u32,
+    /// Its first pixel by rows there, column and row.
+    pub first: [u32; 2],
+    /// The mean of its pixels there, as column and row.
+    pub middle: [f64; 2],
+    /// The rectangle around all.
+    pub region: Region,
+}
+
+/// Layers whose white cures no deeper than a design rule asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeakBond {
+    /// The number of the rule, in the options.
+    pub rule: usize,
+    /// The first and the last of the layers.
+    pub layers: [u32; 2],
+    /// The number of layers.
+    pub count: u32,
+    /// The first of those that cure least deep for their thickness.
+    pub worst_layer: u32,
+}
+
+/// The effect of a layer's light, as full white has it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LayerCure {
+    /// The depth that cures, in micrometers.
+    pub depth_um: Option<f64>,
+    /// The distance by which each edge grows, in micrometers.
+    pub width_um: Option<f64>,
+    /// The depth from which edges grow, in micrometers (002 eq. 61).
+    pub broadening_um: Option<f64>,
 }
 
 /// Facts from the page of a layer.
@@ -276,6 +326,8 @@ pub struct LayerFacts {
     pub white_at_border: bool,
     /// Whether it has too many narrow places to be judged by rules of widths, as dots have.
     pub is_texture: bool,
+    /// The effect of its light.
+    pub cure: LayerCure,
 }
 
 /// A list that ends where memory would grow without bound.
@@ -333,6 +385,10 @@ pub struct Findings {
     pub size: [u32; 2],
     /// The rules of widths by which narrow features are found.
     pub widths: Vec<WidthRule>,
+    /// The rules of bonds.
+    pub bonds: Vec<BondRule>,
+    /// The rules of aspect ratios.
+    pub aspects: Vec<AspectRule>,
     /// Islands, by what floats.
     pub islands: Listed<Island>,
     /// Islands that never hold a square of the size of a speck nor float for long, as they begin.
@@ -345,6 +401,10 @@ pub struct Findings {
     pub pockets: Listed<Pocket>,
     /// Features narrower than design rules allow, walls first, the narrowest first.
     pub narrow: Listed<NarrowFeature>,
+    /// Pins and holes longer for their width than design rules allow, pins first, the most slender first.
+    pub slender: Listed<SlenderFeature>,
+    /// Layers that do not bond, by rules.
+    pub weak_bonds: Vec<WeakBond>,
     /// Bodies that are off balance, the farthest first.
     pub off_balance: Listed<OffBalance>,
 }
@@ -360,6 +420,7 @@ impl LayerFacts {
             has_white: false,
             white_at_border: false,
             is_texture: false,
+            cure: LayerCure::default(),
         }
     }
 }
@@ -374,6 +435,7 @@ impl Findings {
             self.overhangs.left_out,
             self.pockets.left_out,
             self.narrow.left_out,
+            self.slender.left_out,
             self.off_balance.left_out,
         ]
         .iter()
@@ -399,6 +461,12 @@ impl Findings {
             let kind = |it: &NarrowFeature| (!it.is_white, !it.is_long());
             let width = a.width.total_cmp(&b.width);
             kind(a).cmp(&kind(b)).then(width).then(a.layers.cmp(&b.layers)).then(a.at.cmp(&b.at))
+        });
+        self.slender.list.sort_by(|a, b| {
+            let ratio = |it: &SlenderFeature| it.length / it.width;
+            let by_ratio = ratio(b).total_cmp(&ratio(a));
+            let by_place = a.layers.cmp(&b.layers).then(a.first.cmp(&b.first));
+            b.is_white.cmp(&a.is_white).then(by_ratio).then(by_place)
         });
         self.off_balance.list.sort_by(|a, b| {
             b.off_pixels.total_cmp(&a.off_pixels).then(a.worst_layer.cmp(&b.worst_layer))
@@ -447,6 +515,11 @@ impl Findings {
             narrowest_layer: narrow.narrowest_layer + base,
             ..narrow
         });
+        self.slender = parts.slender.map(|slender| SlenderFeature {
+            layers: span(slender.layers),
+            widest_layer: slender.widest_layer + base,
+            ..slender
+        });
         self.off_balance = parts.off_balance.map(|off| OffBalance {
             layer: off.layer + base,
             worst_layer: off.worst_layer + base,
@@ -457,6 +530,7 @@ impl Findings {
         }
         for (layer, of_parts) in self.layers[base as usize..].iter_mut().zip(&parts.layers) {
             layer.white_at_border = of_parts.white_at_border;
+            layer.is_texture = of_parts.is_texture;
         }
         self.sort();
         self

@@ -21,14 +21,18 @@ mod overhangs;
 mod pairs;
 mod pockets;
 mod rules;
+mod slender;
 mod span;
 mod standing;
 
+use std::fmt;
 use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Layer, Length, Mask, MaskBuilder, MemorySize, Op, Pitch, take_batch, white_runs};
+use lamp_stack::{
+    Layer, Length, Mask, MaskBuilder, MemorySize, Op, PageInfo, Pitch, take_batch, white_runs,
+};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -37,8 +41,8 @@ pub(crate) use contact::Labelled;
 use contact::LayerContact;
 use drain::Drain;
 pub use findings::{
-    Findings, HeldAt, Island, IslandEnd, LayerFacts, Listed, NarrowFeature, OffBalance, Overhang,
-    Pocket, PocketEffect, PocketKind, Region, WeakJoint,
+    Findings, HeldAt, Island, IslandEnd, LayerCure, LayerFacts, Listed, NarrowFeature, OffBalance,
+    Overhang, Pocket, PocketEffect, PocketKind, Region, SlenderFeature, WeakBond, WeakJoint,
 };
 use islands::{Growth, Speck};
 use liquid::Liquid;
@@ -50,7 +54,8 @@ pub(crate) use overhang::without;
 use overhangs::Overhangs;
 pub use pairs::{Disagreements, IslandMinimum, LoneMinimum};
 use pockets::Hollows;
-pub use rules::{DesignRules, LeastWidthRule, RuleError};
+pub use rules::{AspectRule, BondRule, DesignRules, LeastWidthRule, RuleError};
+use slender::{Section, Slenders, sections};
 pub(crate) use standing::Standing;
 
 /// Limits from which something counts as a finding.
@@ -75,8 +80,20 @@ pub struct CheckOptions {
     pub drain: Option<Length>,
     /// The design rules by which features are too narrow.
     pub widths: Vec<WidthRule>,
+    /// The design rules by which layers do not bond.
+    pub bonds: Vec<BondRule>,
+    /// The design rules by which pins and holes are too long. They need a resolution and heights.
+    pub aspects: Vec<AspectRule>,
+    /// The light of layers, which rules of bonds and of cure widths need.
+    pub light: Option<Arc<dyn LayerLight>>,
     /// Whether to look for islands alone.
     pub islands_only: bool,
+}
+
+/// The light of a stack's layers.
+pub trait LayerLight: fmt::Debug + Send + Sync {
+    /// Returns what full white cures in a layer.
+    fn cure(&self, layer: &PageInfo) -> LayerCure;
 }
 
 /// A design rule: how wide features must be.
@@ -99,15 +116,21 @@ pub enum LeastWidth {
     Length(Length),
     /// A number of widths of a pixel.
     Pixels(f64),
+    /// A number of cure widths of the layer. It needs a resolution and a resin.
+    CureWidths(f64),
 }
 
 impl LeastWidth {
-    /// Returns the width in widths of a pixel; none if it is not known.
-    pub(crate) fn widths(self, pitch: Option<Pitch>) -> Option<f64> {
-        match self {
-            Self::Length(length) => Some(length.pixels(pitch?.x)),
-            Self::Pixels(pixels) => Some(pixels),
-        }
+    /// Returns the width in widths of a pixel, given the effect of a layer's light; none if it is not known,
+    /// or zero.
+    fn widths(self, pitch: Option<Pitch>, cure: LayerCure) -> Option<f64> {
+        let widths = match self {
+            Self::Length(length) => length.pixels(pitch?.x),
+            Self::Pixels(pixels) => pixels,
+            Self::CureWidths(number) => Length::from_um(number * cure.width_um?).pixels(pitch?.x),
+        };
+        // Light that moves no edge closes nothing.
+        (widths > 0.0).then_some(widths)
     }
 }
 
@@ -123,6 +146,9 @@ impl Default for CheckOptions {
             max_overhang: None,
             drain: None,
             widths: Vec::new(),
+            bonds: Vec::new(),
+            aspects: Vec::new(),
+            light: None,
             islands_only: false,
         }
     }
@@ -379,6 +405,7 @@ struct LabeledLayer {
     origin_mm: Option<[f64; 2]>,
     labelled: Labelled,
     breaches: Vec<Breach>,
+    sections: Vec<Section>,
 }
 
 impl LabeledLayer {
@@ -388,10 +415,22 @@ impl LabeledLayer {
         let mut facts = LayerFacts::new(&info);
         facts.has_white = labelled.of_colour(true).next().is_some();
         facts.white_at_border = labelled.of_colour(true).any(|white| labelled.reaches_frame(white));
-        let breaches = breaches(&labelled, pitch, options);
+        facts.cure = options.light.as_ref().map_or_else(LayerCure::default, |it| it.cure(&info));
+        let breaches = breaches(&labelled, pitch, facts.cure, options);
         facts.is_texture = breaches.is_none();
         let breaches = breaches.unwrap_or_default();
-        Self { facts, name: info.name(), pitch, origin_mm: info.origin_mm, labelled, breaches }
+        let widest = options.aspects.iter().map(|rule| match rule.widest.zip(pitch) {
+            Some((widest, pitch)) => widest.pixels(pitch.x),
+            None => f64::INFINITY,
+        });
+        let sections = match widest.reduce(f64::max) {
+            Some(widest) if !options.islands_only && pitch.is_some() => {
+                sections(&labelled, widest, Metric::of(pitch))
+            }
+            _ => Vec::new(),
+        };
+        let (name, origin_mm) = (info.name(), info.origin_mm);
+        Self { facts, name, pitch, origin_mm, labelled, breaches, sections }
     }
 
     fn size(&self) -> [u32; 2] {
@@ -405,11 +444,16 @@ const LESS: f64 = 2.0;
 
 /// Returns the places of a layer that break rules of widths, each with the rule of the least width;
 /// `None` of a texture.
-fn breaches(layer: &Labelled, pitch: Option<Pitch>, options: &CheckOptions) -> Option<Vec<Breach>> {
+fn breaches(
+    layer: &Labelled,
+    pitch: Option<Pitch>,
+    cure: LayerCure,
+    options: &CheckOptions,
+) -> Option<Vec<Breach>> {
     if options.islands_only {
         return Some(Vec::new());
     }
-    let of_rule = |rule: &WidthRule| rule.least.widths(pitch);
+    let of_rule = |rule: &WidthRule| rule.least.widths(pitch, cure);
     let limits = [true, false].map(|is_white| {
         let rules = options.widths.iter().filter(|rule| rule.is_of_white == is_white);
         rules.filter_map(of_rule).reduce(f64::max)
@@ -427,6 +471,33 @@ fn breaches(layer: &Labelled, pitch: Option<Pitch>, options: &CheckOptions) -> O
     Some(places.into_iter().filter_map(breach).collect())
 }
 
+/// The share of a layer's thickness by which white that just cures it may be off, to rounding.
+const JUST: f64 = 1e-3;
+
+/// Returns the layers that cure no deeper than each rule asks for.
+fn weak_bonds(layers: &[LayerFacts], rules: &[BondRule]) -> Vec<WeakBond> {
+    // How deep a layer with white cures, in layers.
+    let cured = |layer: &LayerFacts| {
+        let depth = layer.cure.depth_um.filter(|_| layer.has_white)?;
+        Some(depth / layer.thickness_um?)
+    };
+    let bond = |(rule, BondRule { layers: most, .. }): (usize, &BondRule)| {
+        let depths = (0..).zip(layers).filter_map(|(at, layer)| Some((at, cured(layer)?)));
+        let mut weak = depths.filter(|(_, depth)| *depth < most + JUST);
+        let (first, mut least) = weak.next()?;
+        let mut bond = WeakBond { rule, layers: [first; 2], count: 1, worst_layer: first };
+        for (at, depth) in weak {
+            (bond.layers[1], bond.count) = (at, bond.count + 1);
+            // Less is rounding, too.
+            if depth < least - JUST {
+                (least, bond.worst_layer) = (depth, at);
+            }
+        }
+        Some(bond)
+    };
+    rules.iter().enumerate().filter_map(bond).collect()
+}
+
 /// The state of a check after the layers so far.
 struct Checker {
     options: CheckOptions,
@@ -439,6 +510,8 @@ struct Checker {
     drain: Option<(Drain, Hollows)>,
     overhangs: Overhangs,
     narrows: Narrows,
+    /// Without a resolution, no length over width is known.
+    slenders: Option<Slenders>,
     weak_joints: Listed<WeakJoint>,
 }
 
@@ -463,6 +536,9 @@ impl Checker {
             drain: drain.transpose()?,
             overhangs: Overhangs::new(options.least_overhang(pitch)),
             narrows: Narrows::new(options.speck_layers.get(), pitch.map(|pitch| pitch.um()[0])),
+            slenders: pitch.filter(|_| !options.aspects.is_empty()).map(|pitch| {
+                Slenders::new(&options.aspects, pitch.um()[0], Metric::of(Some(pitch)))
+            }),
             weak_joints: Listed::default(),
         })
     }
@@ -506,6 +582,12 @@ impl Checker {
         }
         self.liquid.add(&layer.labelled, contact, number, thickness_um);
         self.narrows.add(&layer.breaches, number, layer.facts.thickness_um);
+        if let (Some(slenders), Some(um)) = (&mut self.slenders, layer.facts.thickness_um)
+            && let Some(pitch) = self.pitch
+        {
+            let thickness = um / pitch.um()[0];
+            slenders.add(&layer.labelled, &layer.sections, contact, number, thickness);
+        }
         if let Some(contact) = contact {
             self.add_weak_joints(&layer.labelled, contact, number);
             // On a slope, patches of neighboring layers may be a limit and a pixel apart.
@@ -550,6 +632,11 @@ impl Checker {
         self.liquid.finish();
         self.overhangs.finish();
         self.narrows.finish();
+        let slender = self.slenders.map(|mut slenders| {
+            slenders.finish();
+            slenders.ended
+        });
+        let weak_bonds = weak_bonds(&self.layers, &self.options.bonds);
         let narrow = self.drain.map(|(drain, hollows)| drain.finish(hollows)).unwrap_or_default();
         let mut pockets = self.liquid.pockets;
         narrow.list.into_iter().for_each(|pocket| pockets.push(pocket));
@@ -560,12 +647,16 @@ impl Checker {
             origin_mm: self.origin_mm,
             size: self.size,
             widths: self.options.widths,
+            bonds: self.options.bonds,
+            aspects: self.options.aspects,
             islands: self.growth.islands,
             specks: self.growth.specks,
             weak_joints: self.weak_joints,
             overhangs: self.overhangs.ended,
             pockets,
             narrow: self.narrows.ended,
+            slender: slender.unwrap_or_default(),
+            weak_bonds,
             off_balance: self.growth.off_balance,
         };
         findings.sort();

@@ -38,7 +38,6 @@ pub(super) struct Narrows {
 #[derive(Clone, Debug)]
 struct Growing {
     feature: NarrowFeature,
-    limit: f64,
     /// The sum of its layers' thicknesses, if all are known.
     height_um: Option<f64>,
 }
@@ -103,7 +102,8 @@ impl Narrows {
         let layers = last - first + 1;
         let is_high = match growing.height_um.zip(self.pixel_um) {
             Some((height_um, pixel_um)) => {
-                layers >= LEAST_LAYERS && height_um > LEAST_HEIGHT * growing.limit * pixel_um
+                layers >= LEAST_LAYERS
+                    && height_um > LEAST_HEIGHT * growing.feature.limit * pixel_um
             }
             None => layers >= self.least_layers,
         };
@@ -121,17 +121,18 @@ impl Growing {
             rule: *rule,
             layers: [layer; 2],
             width: place.width,
+            limit: *limit,
             narrowest_layer: layer,
             at: place.at,
             length: place.length,
             region: place.region.clone(),
             runs: place.runs.clone(),
         };
-        Self { feature, limit: *limit, height_um }
+        Self { feature, height_um }
     }
 
     fn unite(&mut self, other: Self) {
-        let Self { feature, limit, height_um } = other;
+        let Self { feature, height_um } = other;
         let own = &mut self.feature;
         let is_later = feature.layers[0] > own.layers[1];
         own.layers = [own.layers[0].min(feature.layers[0]), own.layers[1].max(feature.layers[1])];
@@ -140,7 +141,7 @@ impl Growing {
         if feature.width < own.width {
             (own.width, own.at, own.runs) = (feature.width, feature.at, feature.runs);
             (own.rule, own.narrowest_layer) = (feature.rule, feature.narrowest_layer);
-            self.limit = limit;
+            own.limit = feature.limit;
         }
         self.height_um = match (self.height_um, height_um) {
             (Some(own), Some(other)) if is_later => Some(own + other),

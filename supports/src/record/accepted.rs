@@ -67,6 +67,7 @@ fn size(record: &FindingRecord) -> Option<(Option<f64>, f64)> {
         | FindingRecord::Sealed(pocket)
         | FindingRecord::Narrow(pocket) => (pocket.volume_mm3, pocket.volume_px as f64),
         FindingRecord::Overhang(overhang) => (overhang.reach_mm, overhang.reach_px),
+        FindingRecord::Slender(slender) => (slender.length_mm, slender.length_px),
         _ => return None,
     })
 }

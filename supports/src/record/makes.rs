@@ -6,13 +6,13 @@ use lamp_stack::to_nm;
 
 use super::scale::Scale;
 use super::{
-    BorderRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingRecord, FoundPixels,
-    IslandRecord, Joined, JointRecord, MinimumRecord, NarrowRecord, OffBalanceRecord,
-    OverhangRecord, PartWord, PocketRecord, Shown, ShownMoment, StrayRowsRecord,
+    BondRecord, BorderRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingRecord,
+    FoundPixels, IslandRecord, Joined, JointRecord, MinimumRecord, NarrowRecord, OffBalanceRecord,
+    OverhangRecord, PartWord, PocketRecord, Shown, ShownMoment, SlenderRecord, StrayRowsRecord,
 };
 use crate::check::{
     Disagreements, Findings, Island, IslandEnd, LayerFacts, LoneMinimum, Metric, NarrowFeature,
-    OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint,
+    OffBalance, Overhang, Pocket, PocketKind, Region, SlenderFeature, WeakBond, WeakJoint,
 };
 
 /// Returns the records of all findings, the worst first, given the shear stress of the recoating
@@ -38,6 +38,10 @@ pub fn records(
     let overhang = |overhang: &Overhang| Record::Overhang(of_overhang(overhang, scale));
     records.extend(findings.overhangs.list.iter().map(overhang));
     records.extend(findings.narrow.list.iter().map(|narrow| of_narrow(narrow, findings, scale)));
+    let slender = |slender: &SlenderFeature| Record::Slender(of_slender(slender, findings, scale));
+    records.extend(findings.slender.list.iter().map(slender));
+    let bonds = findings.weak_bonds.iter();
+    records.extend(bonds.map(|bond| Record::WeakBond(of_bond(bond, findings, scale))));
     // Less is rounding to pixels.
     let least = Metric::of(findings.pitch).longer_side();
     let off = findings.off_balance.list.iter().filter(|off| off.off_pixels >= least);
@@ -200,11 +204,10 @@ fn of_overhang(overhang: &Overhang, scale: &Scale<'_>) -> OverhangRecord {
 
 fn of_narrow(narrow: &NarrowFeature, findings: &Findings, scale: &Scale<'_>) -> FindingRecord {
     let rule = &findings.widths[narrow.rule];
-    let least = rule.least.widths(findings.pitch).unwrap_or_default();
     let length = |widths: f64| (widths, scale.length_mm(widths));
     let ((width_px, width_mm), (length_px, length_mm)) =
         (length(narrow.width), length(narrow.length));
-    let (least_px, least_mm) = length(least);
+    let (least_px, least_mm) = length(narrow.limit);
     let pixels = if narrow.is_white { FoundPixels::White } else { FoundPixels::Black };
     let record = NarrowRecord {
         layers: scale.span(narrow.layers),
@@ -228,6 +231,51 @@ fn of_narrow(narrow: &NarrowFeature, findings: &Findings, scale: &Scale<'_>) -> 
         },
     };
     if narrow.is_white { FindingRecord::Thin(record) } else { FindingRecord::Slot(record) }
+}
+
+fn of_slender(slender: &SlenderFeature, findings: &Findings, scale: &Scale<'_>) -> SlenderRecord {
+    let rule = &findings.aspects[slender.rule];
+    let pixels = if slender.is_white { FoundPixels::White } else { FoundPixels::Black };
+    let place = slender.middle.map(|place| place as u32);
+    SlenderRecord {
+        layers: scale.span(slender.layers),
+        at: scale.point(slender.middle),
+        bounds: scale.bounds(&slender.region),
+        is_white: slender.is_white,
+        length_px: slender.length,
+        length_mm: scale.length_mm(slender.length),
+        width_px: slender.width,
+        width_mm: scale.length_mm(slender.width),
+        widest_layer: scale.layer(slender.widest_layer).layer,
+        aspect_ratio: slender.length / slender.width,
+        rule: rule.name.clone(),
+        source: rule.source.clone(),
+        most: rule.most,
+        shown: Shown {
+            layers: slender.layers,
+            pixel: Some(slender.first),
+            at: place,
+            ..shown(slender.widest_layer, &slender.region, pixels, scale)
+        },
+    }
+}
+
+fn of_bond(bond: &WeakBond, findings: &Findings, scale: &Scale<'_>) -> BondRecord {
+    let rule = &findings.bonds[bond.rule];
+    let worst = &findings.layers[bond.worst_layer as usize];
+    let mm = |um: f64| (um * 1e3).round() / 1e6;
+    BondRecord {
+        layers: scale.span(bond.layers),
+        layer_count: bond.count,
+        worst_layer: worst.index,
+        // Only layers that state both break a rule.
+        cure_depth_mm: mm(worst.cure.depth_um.unwrap_or_default()),
+        thickness_mm: mm(worst.thickness_um.unwrap_or_default()),
+        broadening_depth_mm: worst.cure.broadening_um.map(mm),
+        rule: rule.name.clone(),
+        source: rule.source.clone(),
+        least_layers: rule.layers,
+    }
 }
 
 fn of_balance(off: &OffBalance, scale: &Scale<'_>) -> OffBalanceRecord {

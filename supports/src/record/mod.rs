@@ -55,6 +55,10 @@ pub enum FindingRecord {
     Thin(NarrowRecord),
     /// Black that is narrower than a design rule allows.
     Slot(NarrowRecord),
+    /// A pin or a hole that is longer for its width than a design rule allows.
+    Slender(SlenderRecord),
+    /// Layers whose white cures no deeper than a design rule asks for.
+    WeakBond(BondRecord),
     /// A body whose center of gravity leaves its base.
     OffBalance(OffBalanceRecord),
     /// A copy that differs from the others of its part.
@@ -387,6 +391,73 @@ pub struct NarrowRecord {
     pub shown: Shown,
 }
 
+/// A pin or a hole that is longer for its width than a design rule allows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(default)]
+pub struct SlenderRecord {
+    /// The layers.
+    #[serde(flatten)]
+    pub layers: LayerSpan,
+    /// The mean of its pixels where it is widest.
+    #[serde(flatten)]
+    pub at: PointRecord,
+    /// The rectangle around all.
+    #[serde(flatten)]
+    pub bounds: BoxRecord,
+    /// Whether it is white: a pin, and no hole.
+    pub is_white: bool,
+    /// Its length along the middles of its layers, in widths of a pixel.
+    pub length_px: f64,
+    /// The same in millimeters.
+    pub length_mm: Option<f64>,
+    /// The width of its widest layer, in widths of a pixel: the least distance of two parallel lines that
+    /// hold it.
+    pub width_px: f64,
+    /// The same in millimeters.
+    pub width_mm: Option<f64>,
+    /// The index of the first layer that is so wide.
+    pub widest_layer: u32,
+    /// The length over the width.
+    pub aspect_ratio: f64,
+    /// The name of the rule that it breaks.
+    pub rule: String,
+    /// Where the rule is from.
+    pub source: String,
+    /// The greatest aspect ratio by the rule.
+    pub most: f64,
+    /// The picture of it, which JSON does not have.
+    #[serde(skip)]
+    pub shown: Shown,
+}
+
+/// Layers whose white cures no deeper than a design rule asks for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(default)]
+pub struct BondRecord {
+    /// The first and the last of the layers.
+    #[serde(flatten)]
+    pub layers: LayerSpan,
+    /// The number of layers.
+    pub layer_count: u32,
+    /// The index of the first layer that cures least deep for its thickness.
+    pub worst_layer: u32,
+    /// The depth that full white cures there, in millimeters.
+    pub cure_depth_mm: f64,
+    /// That layer's thickness, in millimeters.
+    pub thickness_mm: f64,
+    /// The depth from which edges grow, the broadening depth, in millimeters; null if the resin does not say
+    /// it.
+    pub broadening_depth_mm: Option<f64>,
+    /// The name of the rule that the layers break.
+    pub rule: String,
+    /// Where the rule is from.
+    pub source: String,
+    /// The depth by the rule, in layers.
+    pub least_layers: f64,
+}
+
 /// A body whose center of gravity leaves its base as it is built.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -501,6 +572,8 @@ mod tests {
             FindingRecord::Overhang(OverhangRecord::default()),
             FindingRecord::Thin(NarrowRecord::default()),
             FindingRecord::Slot(NarrowRecord::default()),
+            FindingRecord::Slender(SlenderRecord::default()),
+            FindingRecord::WeakBond(BondRecord::default()),
             FindingRecord::OffBalance(OffBalanceRecord::default()),
             FindingRecord::CopyDiffers(CopyRecord::default()),
             FindingRecord::Border(BorderRecord::default()),

@@ -4,9 +4,10 @@ use std::fmt;
 
 use super::places::{area_text, length_text, significant, volume_text};
 use super::{
-    BoxRecord, CopyRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingGroup,
+    BondRecord, BoxRecord, CopyRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingGroup,
     FindingRecord, FoundPixels, IslandRecord, Joined, JointRecord, LayerPlace, LayerSpan,
     MinimumRecord, NarrowRecord, OffBalanceRecord, OverhangRecord, PocketRecord, Shown,
+    SlenderRecord,
 };
 
 impl FindingRecord {
@@ -27,6 +28,9 @@ impl FindingRecord {
             Self::Thin(_) => "thin pin",
             Self::Slot(slot) if slot.is_long => "narrow slot",
             Self::Slot(_) => "narrow hole",
+            Self::Slender(slender) if slender.is_white => "slender pin",
+            Self::Slender(_) => "slender hole",
+            Self::WeakBond(_) => "weak bond",
             Self::OffBalance(_) => "off balance",
             Self::CopyDiffers(_) => "differing copy",
             Self::Border(_) => "border",
@@ -49,6 +53,8 @@ impl FindingRecord {
             Self::Overhang(_) => "overhang",
             Self::Thin(_) => "thin",
             Self::Slot(_) => "slot",
+            Self::Slender(_) => "slender",
+            Self::WeakBond(_) => "weak-bond",
             Self::OffBalance(_) => "off-balance",
             Self::CopyDiffers(_) => "copy-differs",
             Self::Border(_) => "border",
@@ -67,7 +73,9 @@ impl FindingRecord {
                 FindingGroup::Pockets
             }
             Self::Overhang(_) => FindingGroup::Overhangs,
-            Self::Thin(_) | Self::Slot(_) => FindingGroup::Rules,
+            Self::Thin(_) | Self::Slot(_) | Self::Slender(_) | Self::WeakBond(_) => {
+                FindingGroup::Rules
+            }
             Self::OffBalance(_) => FindingGroup::Balance,
             Self::StrayRows(_) | Self::CopyDiffers(_) | Self::Border(_) | Self::Empty(_) => {
                 FindingGroup::Layers
@@ -91,6 +99,7 @@ impl FindingRecord {
             | Self::Narrow(pocket) => Some(&pocket.shown),
             Self::Overhang(overhang) => Some(&overhang.shown),
             Self::Thin(narrow) | Self::Slot(narrow) => Some(&narrow.shown),
+            Self::Slender(slender) => Some(&slender.shown),
             _ => None,
         }
     }
@@ -102,6 +111,10 @@ impl FindingRecord {
             Self::Trap(_) | Self::Cup(_) | Self::Sealed(_) | Self::Narrow(_) | Self::Slot(_) => {
                 FoundPixels::Black
             }
+            Self::Slender(slender) => match slender.is_white {
+                true => FoundPixels::White,
+                false => FoundPixels::Black,
+            },
             Self::Overhang(_) => FoundPixels::Unheld,
             _ => FoundPixels::All,
         }
@@ -122,6 +135,8 @@ impl FindingRecord {
             | Self::Narrow(pocket) => span(&pocket.layers),
             Self::Overhang(overhang) => span(&overhang.layers),
             Self::Thin(narrow) | Self::Slot(narrow) => span(&narrow.layers),
+            Self::Slender(slender) => span(&slender.layers),
+            Self::WeakBond(bond) => span(&bond.layers),
             Self::OffBalance(off) => one(&off.layer),
             Self::StrayRows(rows) => span(&rows.layers),
             Self::CopyDiffers(copy) => span(&copy.layers),
@@ -143,6 +158,8 @@ impl FindingRecord {
             | Self::Narrow(pocket) => pocket.layers.z_mm,
             Self::Overhang(overhang) => overhang.layers.z_mm,
             Self::Thin(narrow) | Self::Slot(narrow) => narrow.layers.z_mm,
+            Self::Slender(slender) => slender.layers.z_mm,
+            Self::WeakBond(bond) => bond.layers.z_mm,
             Self::OffBalance(off) => off.layer.z_mm,
             Self::StrayRows(rows) => rows.layers.z_mm,
             Self::CopyDiffers(copy) => copy.layers.z_mm,
@@ -162,6 +179,7 @@ impl FindingRecord {
             | Self::Narrow(pocket) => Some(pocket.bounds.clone()),
             Self::Overhang(overhang) => Some(overhang.bounds.clone()),
             Self::Thin(narrow) | Self::Slot(narrow) => Some(narrow.bounds.clone()),
+            Self::Slender(slender) => Some(slender.bounds.clone()),
             Self::OffBalance(off) => {
                 Some(BoxRecord { box_mm: off.base_box_mm, box_px: off.base_box_px })
             }
@@ -182,6 +200,7 @@ impl FindingRecord {
             Self::WeakJoint(joint) => Some(joint.at.at_px),
             Self::Overhang(overhang) => Some(overhang.at.at_px),
             Self::Thin(narrow) | Self::Slot(narrow) => Some(narrow.at.at_px),
+            Self::Slender(slender) => Some(slender.at.at_px),
             Self::OffBalance(off) => Some(off.at.at_px),
             _ => None,
         }
@@ -218,6 +237,12 @@ impl FindingRecord {
             ],
             Self::Thin(narrow) | Self::Slot(narrow) => {
                 vec![Some(narrow.width_text()), Some(format!("rule {}", narrow.rule))]
+            }
+            Self::Slender(slender) => {
+                vec![Some(slender.ratio_text()), Some(format!("rule {}", slender.rule))]
+            }
+            Self::WeakBond(bond) => {
+                vec![Some(bond.depth_text()), Some(format!("rule {}", bond.rule))]
             }
             Self::OffBalance(off) => vec![off.off_mm.map(|mm| number(mm, "mm off its base"))],
             _ => Vec::new(),
@@ -298,6 +323,12 @@ impl fmt::Display for Sentence<'_> {
             }
             FindingRecord::Thin(narrow) | FindingRecord::Slot(narrow) => {
                 narrow.write(f, &self.layers(format_args!("{} ", narrow.layers)))
+            }
+            FindingRecord::Slender(slender) => {
+                slender.write(f, &self.layers(format_args!("{} ", slender.layers)))
+            }
+            FindingRecord::WeakBond(bond) => {
+                bond.write(f, &self.layers(format_args!("{}: ", bond.layers)))
             }
             FindingRecord::OffBalance(off) => {
                 off.write(f, &self.layers(format_args!("from {} on ", off.layer)))
@@ -446,6 +477,46 @@ impl NarrowRecord {
     }
 }
 
+impl SlenderRecord {
+    /// Returns its length over its width as text.
+    fn ratio_text(&self) -> String {
+        let length = length_text(self.length_px, self.length_mm);
+        let width = length_text(self.width_px, self.width_mm);
+        format!("{length} long and {width} wide, which is {} times", significant(self.aspect_ratio))
+    }
+
+    fn write(&self, f: &mut fmt::Formatter<'_>, place: &str) -> fmt::Result {
+        let Self { at, most, rule, source, .. } = self;
+        let ratio = self.ratio_text();
+        write!(f, "{place}at {at}: {ratio}, more than the {most} of rule {rule} ({source})")
+    }
+}
+
+impl BondRecord {
+    /// Returns how deep the worst layer cures, as text.
+    fn depth_text(&self) -> String {
+        let um = |mm: f64| format!("{} um", significant(1000.0 * mm));
+        let [depth, thickness] = [self.cure_depth_mm, self.thickness_mm].map(um);
+        format!("white cures {depth} deep in a layer of {thickness}")
+    }
+
+    fn write(&self, f: &mut fmt::Formatter<'_>, layers: &str) -> fmt::Result {
+        let Self { layer_count, worst_layer, rule, source, least_layers, .. } = self;
+        write!(f, "{layers}{}", self.depth_text())?;
+        if *layer_count > 1 {
+            write!(f, ", layer {worst_layer} of {layer_count} such layers")?;
+        }
+        let plural = if *least_layers == 1.0 { "" } else { "s" };
+        write!(f, ", no deeper than the {least_layers} layer{plural} of rule {rule} ({source})")?;
+        match self.broadening_depth_mm {
+            Some(mm) => {
+                write!(f, "; edges grow if it cures deeper than {} um", significant(1000.0 * mm))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
 impl OffBalanceRecord {
     fn write(&self, f: &mut fmt::Formatter<'_>, layers: &str) -> fmt::Result {
         let Self { worst_layer, at, .. } = self;
@@ -480,6 +551,8 @@ mod tests {
             (span("overhang"), "layers 80 to 96 "),
             (span("thin"), "layers 80 to 96 "),
             (span("slot"), "layers 80 to 96 "),
+            (span("slender"), "layers 80 to 96 "),
+            (span("weak-bond"), "layers 80 to 96: "),
             (span("off-balance"), "from layer 80 (z 8.00 mm) on "),
             (span("stray-rows"), "layers 80 to 96: "),
             (span("copy-differs"), " in layers 80 to 96"),

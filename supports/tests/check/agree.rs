@@ -56,8 +56,7 @@ pub(crate) fn check(layers: Vec<Layer>, limits: &Limits) -> Findings {
         least_support: limits.least_support,
         max_overhang: limits.max_overhang_um.map(Length::from_um),
         drain: limits.drain_um.map(Length::from_um),
-        islands_only: false,
-        widths: Vec::new(),
+        ..CheckOptions::default()
     };
     let layers = layers.into_iter().map(Ok::<_, CheckError>);
     check_layers(layers, Ok, &options).unwrap()

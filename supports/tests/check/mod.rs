@@ -8,4 +8,5 @@ mod narrow;
 mod parts;
 mod random_parts;
 mod referee;
+mod slender;
 mod spans;

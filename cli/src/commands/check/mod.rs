@@ -30,9 +30,10 @@ use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, n
 use crate::terminal::progress::{Progress, printable};
 use crate::terminal::stack_notes::doubts;
 use lamp_pipeline::build_copies::{BuildCopies, Inseparable};
-use lamp_pipeline::check::{CheckSettings, Found};
+use lamp_pipeline::check::{CheckSettings, Found, known};
+use lamp_pipeline::exposure::ExposureSettings;
 use lamp_pipeline::solid::at_part;
-use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
+use lamp_pipeline::{SliceSettings, SlicedPart, StackLight, check_slicing};
 
 use pictures::write_pictures;
 use report::write_report;
@@ -52,6 +53,7 @@ Examples:
   slice blade.stl | fix | lamp check --strict
   lamp check night/*.tif --only islands,pockets --report check.json
   lamp check blade.tif --accept check.json --strict
+  lamp check blade.tif --material lamp-suspension --rules mine.toml
 
 Exit status: 0 if the work is done, even with findings; 3 with --strict if there are any.")]
 pub(crate) struct CheckArgs {
@@ -105,7 +107,11 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
     let machine: Machine = args.settings.machine()?;
-    let slicing = SliceSettings::try_from(&args.slicing)?;
+    let mut slicing = SliceSettings::try_from(&args.slicing)?;
+    // Of stacks, the resin is the one whose light design rules judge.
+    if matches!(slicing.exposure, ExposureSettings::Material { .. }) {
+        slicing.exposure = ExposureSettings::None {};
+    }
     check_slicing(&slicing, &args.inputs, Some(&machine))?;
     let evidence = args.evidence.as_deref().map(|folder| new_folder(folder, args.force));
     let evidence = evidence.transpose()?;
@@ -167,13 +173,20 @@ impl CheckArgs {
                 let first = pages.peek().and_then(|page| page.as_ref().ok());
                 let from = self.layers.as_ref().map_or(0, |layers| layers.start);
                 let build = BuildCopies::of_page(first, from);
+                let folders = [path.parent().unwrap_or(Path::new("")), Path::new("")];
+                let light = match &slicing.exposure {
+                    ExposureSettings::None {} => {
+                        StackLight::of_stack(first.map(Page::info), &folders)
+                    }
+                    settings => StackLight::of_settings(settings)?,
+                };
                 let pages = in_range(pages, Page::info, path, self.layers.clone());
                 let decode = |(page, _): (Page, _)| {
                     let layer = page.decode().map_err(|error| failed_at(name.clone(), error));
                     progress.layer_done();
                     layer
                 };
-                let found = self.settings.find(build, pages, decode, Some(machine));
+                let found = self.settings.find(build, light, pages, decode, Some(machine));
                 found.map_err(|error: Exit| {
                     // Errors of pages have their place.
                     match error.cause::<CheckError>() {
@@ -188,11 +201,12 @@ impl CheckArgs {
                     progress.layer_done();
                     Ok::<_, Exit>(layer)
                 };
-                let options = self.settings.options()?;
+                let (light, no_light) = known(StackLight::of_settings(&part.settings.exposure)?);
+                let options = self.settings.options(light)?;
                 let findings = lamp_supports::check(layers, decode, &options)?;
                 let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
                 let build = Err(Inseparable::NoBuild);
-                self.settings.found(findings, &disagreements, Vec::new(), build, machine)
+                self.settings.found(findings, &disagreements, Vec::new(), build, no_light, machine)
             }
         };
         progress.done();

@@ -1,9 +1,11 @@
 //! Gathers the contents of a stack's report, in one pass over its layers.
 
 use std::cell::RefCell;
+use std::path::Path;
 
 use lamp_gantry::{BuildClock, BuildTime};
 use lamp_machine::Machine;
+use lamp_pipeline::StackLight;
 use lamp_pipeline::build_copies::BuildCopies;
 use lamp_pipeline::check::{CheckSettings, Found, PlacedFinding};
 use lamp_plots::{EvidencePicture, StackViews, ViewGrid};
@@ -162,7 +164,8 @@ impl StackReport {
                 }
             });
         let build = BuildCopies::of(&headers[0].info, headers[0].size);
-        let found = match CheckSettings::default().find(build, &mut layers, Ok, machine) {
+        let light = StackLight::of_stack(Some(&headers[0].info), &[Path::new("")]);
+        let found = match CheckSettings::default().find(build, light, &mut layers, Ok, machine) {
             Ok(found) => Ok(found),
             // A stack that cannot be checked still has numbers and pictures.
             Err(error) => match error.cause::<CheckError>() {

@@ -10,7 +10,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_pipeline::build_copies::BuildCopies;
 use lamp_pipeline::check::CheckSettings;
-use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
+use lamp_pipeline::{SliceSettings, SlicedPart, StackLight, check_slicing};
 use lamp_stack::{Destination, Format, IndexedStack, Page, PrivateFile, write_stack};
 use lamp_view::{
     Address, Finding, Ticket, Token, ViewedStack, Viewer, WorkProgress, licences, of_records,
@@ -235,7 +235,8 @@ fn find(
         Ok::<_, Exit>(layer)
     };
     let build = BuildCopies::of(&headers[0].info, headers[0].size);
-    let found = settings.find(build, pages, decode, None)?;
+    let light = StackLight::of_stack(Some(&headers[0].info), &[Path::new("")]);
+    let found = settings.find(build, light, pages, decode, None)?;
     let lines = found.features.iter().map(|feature| {
         (&found.records[feature.finding], found.text(feature), found.about(feature))
     });

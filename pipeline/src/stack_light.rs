@@ -1,0 +1,80 @@
+//! The light of a stack's layers, by which design rules judge bonds and cure widths.
+
+use std::path::Path;
+
+use lamp_grayscale::exposure::Exposure;
+use lamp_grayscale::resin::{Dose, ExposureTime};
+use lamp_stack::{Length, PageInfo};
+use lamp_supports::{LayerCure, LayerLight};
+
+use crate::error::Error;
+use crate::exposure::ExposureSettings;
+use crate::slice_settings::SlicingRecord;
+
+/// The resin of a stack, and how its layers are exposed.
+#[derive(Debug)]
+pub struct StackLight(Exposure);
+
+/// Why the light of layers is not known, as the end of a sentence.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NoLight(pub String);
+
+impl StackLight {
+    /// Returns the light by settings: of the layers that these slice, or of a stack.
+    ///
+    /// # Errors
+    /// Returns an error if the material cannot be read, or says no cure depth.
+    pub fn of_settings(settings: &ExposureSettings) -> Result<Result<Self, NoLight>, Error> {
+        Ok(match settings.exposure()? {
+            Some(recorded) if recorded.exposure.material().is_some() => Ok(Self(recorded.exposure)),
+            Some(recorded) => {
+                Err(NoLight(format!("{} has exposure times and no resin", recorded.word)))
+            }
+            None => Err(NoLight("no resin is given: --material".to_owned())),
+        })
+    }
+
+    /// Returns the light of a stack by the record on its first page. Materials that are no built-in ones are
+    /// searched for in these folders.
+    ///
+    /// # Errors
+    /// Returns why it is not known.
+    pub fn of_stack(first: Option<&PageInfo>, folders: &[&Path]) -> Result<Self, NoLight> {
+        let record = first.and_then(|info| info.stack.as_ref()).and_then(SlicingRecord::of);
+        let Some(mut record) =
+            record.filter(|it| it.settings.exposure != ExposureSettings::None {})
+        else {
+            return Err(NoLight("the stack states no resin: --material".to_owned()));
+        };
+        let found = record.find_exposure(folders);
+        let light = found.and_then(|()| Self::of_settings(&record.settings.exposure));
+        light.unwrap_or_else(|error| Err(NoLight(format!("{error}: --material"))))
+    }
+}
+
+impl LayerLight for StackLight {
+    /// The dose is that of the page's exposure time, or else the material's own for the layer.
+    fn cure(&self, layer: &PageInfo) -> LayerCure {
+        let Self(exposure) = self;
+        let Some(material) = exposure.material() else { return LayerCure::default() };
+        // Numbers of damaged pages are none.
+        let thickness = layer.thickness_um.filter(|um| um.is_finite() && *um > 0.0);
+        let thickness = thickness.map(Length::from_um);
+        let time = layer.exposure_ms.filter(|ms| ms.is_finite() && *ms >= 0.0);
+        let light = material.light().ok().flatten();
+        let dose = match (time, light) {
+            (Some(ms), Some(light)) => Some(light * ExposureTime::from_ms(ms)),
+            _ => thickness.and_then(|thickness| exposure.dose(thickness).ok().flatten()),
+        };
+        let width = |dose: Dose| {
+            let [x, y] = material.edge_growth(dose, thickness).ok().flatten()?;
+            // Edges that draw back close nothing.
+            Some(x.um().max(y.um()).max(0.0))
+        };
+        LayerCure {
+            depth_um: dose.and_then(|dose| exposure.depth(dose)).map(Length::um),
+            width_um: dose.and_then(width),
+            broadening_um: exposure.broadening_depth().map(Length::um),
+        }
+    }
+}
