@@ -631,7 +631,6 @@ impl Checker {
         self.growth.finish();
         self.liquid.finish();
         self.overhangs.finish();
-        self.narrows.finish();
         let slender = self.slenders.map(|mut slenders| {
             slenders.finish();
             slenders.ended
@@ -654,7 +653,7 @@ impl Checker {
             weak_joints: self.weak_joints,
             overhangs: self.overhangs.ended,
             pockets,
-            narrow: self.narrows.ended,
+            narrow: self.narrows.finish(),
             slender: slender.unwrap_or_default(),
             weak_bonds,
             off_balance: self.growth.off_balance,

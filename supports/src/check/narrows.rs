@@ -2,7 +2,7 @@
 
 use lamp_stack::sets::{root, unite};
 
-use super::findings::{Listed, NarrowFeature};
+use super::findings::{Listed, NarrowFeature, Region};
 use super::narrow::Narrow;
 
 /// The least height of a narrow feature, as a share of its rule's limit: a wedge of 60 degrees is lower
@@ -10,6 +10,13 @@ use super::narrow::Narrow;
 const LEAST_HEIGHT: f64 = 0.75;
 /// The fewest layers of a narrow feature: of thick layers, one or two are such a wedge.
 const LEAST_LAYERS: u32 = 3;
+/// The height, in its rule's limits, over which an edge may be wide enough and still be the same feature:
+/// one about as long as a corner comes and goes with the rounding of pixels.
+const GAP: f64 = 5.0;
+/// How far apart, in limits, its places below and above may be.
+const ASIDE: f64 = 2.0;
+/// The most features that are compared for gaps.
+const MOST_WITH_GAPS: usize = 2_000;
 
 /// A narrow place of a layer, and the rule that it breaks.
 #[derive(Clone, Debug)]
@@ -31,7 +38,7 @@ pub(super) struct Narrows {
     /// The last layer's runs with the numbers of their features in `open`, sorted.
     last: Vec<(u32, u32, u32, usize)>,
     open: Vec<Growing>,
-    pub(super) ended: Listed<NarrowFeature>,
+    ended: Listed<Growing>,
 }
 
 /// A feature that may go on.
@@ -40,6 +47,10 @@ struct Growing {
     feature: NarrowFeature,
     /// The sum of its layers' thicknesses, if all are known.
     height_um: Option<f64>,
+    /// The number of its layers.
+    count: u32,
+    /// The rectangles around it in its first and its last layer.
+    ends: [Region; 2],
 }
 
 impl Narrows {
@@ -91,15 +102,50 @@ impl Narrows {
         merged.into_iter().flatten().for_each(|growing| self.end(growing));
     }
 
-    /// Ends all features.
-    pub(super) fn finish(&mut self) {
+    /// Ends all features, and returns them. Features that follow each other above a short gap are one.
+    pub(super) fn finish(mut self) -> Listed<NarrowFeature> {
         std::mem::take(&mut self.open).into_iter().for_each(|growing| self.end(growing));
+        let Listed { mut list, left_out } = std::mem::take(&mut self.ended);
+        if list.len() <= MOST_WITH_GAPS {
+            list.sort_by_key(|growing| (growing.feature.layers, growing.feature.at));
+            let mut parents: Vec<u32> = (0..list.len() as u32).collect();
+            for (upper, above) in (0..).zip(&list) {
+                for (lower, below) in (0..upper).zip(&list) {
+                    if self.is_continued(below, above) {
+                        unite(&mut parents, lower, upper);
+                    }
+                }
+            }
+            let mut joined: Vec<Option<Growing>> = vec![None; list.len()];
+            for (at, growing) in (0..).zip(list) {
+                match &mut joined[root(&mut parents, at) as usize] {
+                    Some(first) => first.unite(growing),
+                    none => *none = Some(growing),
+                }
+            }
+            list = joined.into_iter().flatten().collect();
+        }
+        Listed { list: list.into_iter().map(|growing| growing.feature).collect(), left_out }
+    }
+
+    /// Returns whether a feature goes on in another, above a short gap.
+    fn is_continued(&self, below: &Growing, above: &Growing) -> bool {
+        let [a, b] = [&below.feature, &above.feature];
+        let Some(gap) = b.layers[0].checked_sub(a.layers[1] + 1) else { return false };
+        let limit = a.limit.max(b.limit);
+        let is_short = match below.height_um.zip(self.pixel_um) {
+            Some((um, pixel_um)) => {
+                f64::from(gap) * um / f64::from(below.count) <= GAP * limit * pixel_um
+            }
+            None => gap <= self.least_layers,
+        };
+        let aside = (ASIDE * limit).min(1e9) as u32;
+        a.is_white == b.is_white && is_short && below.ends[1].is_near(&above.ends[0], [aside; 2])
     }
 
     /// Lists a feature, unless it is the low edge of something wider.
     fn end(&mut self, growing: Growing) {
-        let [first, last] = growing.feature.layers;
-        let layers = last - first + 1;
+        let layers = growing.count;
         let is_high = match growing.height_um.zip(self.pixel_um) {
             Some((height_um, pixel_um)) => {
                 layers >= LEAST_LAYERS
@@ -108,7 +154,7 @@ impl Narrows {
             None => layers >= self.least_layers,
         };
         if is_high {
-            self.ended.push(growing.feature);
+            self.ended.push(growing);
         }
     }
 }
@@ -128,13 +174,24 @@ impl Growing {
             region: place.region.clone(),
             runs: place.runs.clone(),
         };
-        Self { feature, height_um }
+        let ends = [place.region.clone(), place.region.clone()];
+        Self { feature, height_um, count: 1, ends }
     }
 
     fn unite(&mut self, other: Self) {
-        let Self { feature, height_um } = other;
+        let Self { feature, height_um, count, ends: [first, last] } = other;
         let own = &mut self.feature;
         let is_later = feature.layers[0] > own.layers[1];
+        let mut end = |end: usize, other: &Region, layer: u32| {
+            if layer == own.layers[end] {
+                self.ends[end].unite(other);
+            } else if (layer < own.layers[0] && end == 0) || (layer > own.layers[1] && end == 1) {
+                self.ends[end] = other.clone();
+            }
+        };
+        end(0, &first, feature.layers[0]);
+        end(1, &last, feature.layers[1]);
+        self.count = if is_later { self.count + count } else { self.count.max(count) };
         own.layers = [own.layers[0].min(feature.layers[0]), own.layers[1].max(feature.layers[1])];
         own.length = own.length.max(feature.length);
         own.region.unite(&feature.region);

@@ -222,3 +222,26 @@ fn low_features_are_left_out() {
         assert_eq!(findings.narrow.list.len(), usize::from(is_found), "{layers}");
     }
 }
+
+/// A fin that is wide enough in some layers between is one finding, unless it is wide over a height of more than
+/// five limits, or the fin above stands elsewhere.
+#[test]
+fn a_fin_with_a_gap_is_one_feature() {
+    for (gap, aside, count) in [(1, 0.0, 1), (20, 0.0, 1), (30, 0.0, 2), (20, 120.0, 2)] {
+        let layers = (0..20 + gap).map(|layer| {
+            let (half, x0) = if layer < 10 {
+                (10.0, 100.0)
+            } else if layer < 10 + gap {
+                (40.0, 100.0)
+            } else {
+                (10.0, 100.0 + aside)
+            };
+            drawn([300; 2], |[x, y]| (x - x0).abs() < half && (y - 150.0).abs() < 100.0)
+        });
+        let list = found(layers.collect(), LIMIT, lamp_pitch()).narrow.list;
+        assert_eq!(list.len(), count, "{gap} {aside}: {list:?}");
+        if count == 1 {
+            assert_eq!(list[0].layers, [0, 19 + gap]);
+        }
+    }
+}
