@@ -404,6 +404,11 @@ impl Found {
         if pitch.is_some() {
             lacking(&of_light, &|layer| layer.cure.width_um.is_some(), "a dose and its cure width");
         }
+        if layers.iter().any(|layer| layer.cure.needs_others) {
+            let why = "layers are lit that cure only with the light of others: lamp cure shows what cures";
+            unchecked(of_bonds, why);
+            return notes;
+        }
         let has_depth =
             |layer: &LayerFacts| layer.cure.depth_um.is_some() && layer.thickness_um.is_some();
         lacking(&of_bonds, &has_depth, "a dose and its cure depth, and a thickness");

@@ -19,6 +19,8 @@ pub struct StackLight(Exposure);
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NoLight(pub String);
 
+const NO_RESIN: &str = "no resin is known: --material";
+
 impl StackLight {
     /// Returns the light by settings: of the layers that these slice, or of a stack.
     ///
@@ -30,7 +32,7 @@ impl StackLight {
             Some(recorded) => {
                 Err(NoLight(format!("{} has exposure times and no resin", recorded.word)))
             }
-            None => Err(NoLight("no resin is given: --material".to_owned())),
+            None => Err(NoLight(NO_RESIN.to_owned())),
         })
     }
 
@@ -44,7 +46,7 @@ impl StackLight {
         let Some(mut record) =
             record.filter(|it| it.settings.exposure != ExposureSettings::None {})
         else {
-            return Err(NoLight("the stack states no resin: --material".to_owned()));
+            return Err(NoLight(NO_RESIN.to_owned()));
         };
         let found = record.find_exposure(folders);
         let light = found.and_then(|()| Self::of_settings(&record.settings.exposure));
@@ -53,11 +55,11 @@ impl StackLight {
 }
 
 impl LayerLight for StackLight {
-    /// The dose is that of the page's exposure time, or else the material's own for the layer.
+    /// The dose comes from the page's exposure time, or else from the material.
     fn cure(&self, layer: &PageInfo) -> LayerCure {
         let Self(exposure) = self;
         let Some(material) = exposure.material() else { return LayerCure::default() };
-        // Numbers of damaged pages are none.
+        // Damaged pages may have other numbers.
         let thickness = layer.thickness_um.filter(|um| um.is_finite() && *um > 0.0);
         let thickness = thickness.map(Length::from_um);
         let time = layer.exposure_ms.filter(|ms| ms.is_finite() && *ms >= 0.0);
@@ -71,8 +73,13 @@ impl LayerLight for StackLight {
             // Edges that draw back close nothing.
             Some(x.um().max(y.um()).max(0.0))
         };
+        let fades_over = material.working_curve().ok().flatten().map(|it| it.penetration_depth());
+        let reaches_on =
+            fades_over.zip(thickness).is_some_and(|(depth, thickness)| depth > thickness);
+        let depth_um = dose.and_then(|dose| exposure.depth(dose)).map(Length::um);
         LayerCure {
-            depth_um: dose.and_then(|dose| exposure.depth(dose)).map(Length::um),
+            needs_others: reaches_on && depth_um == Some(0.0),
+            depth_um,
             width_um: dose.and_then(width),
             broadening_um: exposure.broadening_depth().map(Length::um),
         }

@@ -37,7 +37,7 @@ pub(crate) fn check<'py>(
                 Some(first) => BuildCopies::of(first.info(), first.size()),
                 None => Err(Inseparable::NoBuild),
             };
-            let light = StackLight::of_stack(first.map(|it| it.info()), &[Path::new("")]);
+            let light = StackLight::of_stack(first.map(PassingLayer::info), &[Path::new("")]);
             let result = settings.find(
                 build,
                 light,

@@ -1,7 +1,7 @@
 //! Checks the reports of `lamp check` on stacks and parts.
 
 use lamp_fixtures::{
-    Mesh, Sample, build, closed_void, cup, mug, needle, ring, serpentine, slanted_wall,
+    Mesh, Sample, build, closed_void, cup, drawn_mask, mug, needle, ring, serpentine, slanted_wall,
 };
 use lamp_stack::{Layer, Mask, PageInfo, Pitch};
 use lamp_tests::Scratch;
@@ -166,8 +166,8 @@ fn stray_rows_are_named_first() {
     scratch.stack("stray.tif", layers);
     let ran = scratch.run("lamp check stray.tif").succeeds_quietly();
     let text = String::from_utf8(ran.stdout).unwrap();
-    let second = text.lines().nth(1).unwrap();
-    assert!(second.starts_with("  stray rows: layer 120 (z 12.00 mm): 2, which"), "{text}");
+    let first = text.lines().skip(1).find(|line| !line.starts_with("  note: ")).unwrap();
+    assert!(first.starts_with("  stray rows: layer 120 (z 12.00 mm): 2, which"), "{text}");
 }
 
 #[test]
@@ -406,4 +406,110 @@ fn a_build_is_judged_by_one_copy_of_each_part() {
     scratch.run("slice cube.stl --dpi 150 --thickness 500um -q -o cube.tif").succeeds();
     scratch.run("tile cube.tif --area 80x80mm --copies 4 -o cubes.tif").succeeds();
     scratch.run("lamp check cubes.tif --strict").succeeds();
+}
+
+/// Layers of a plan cure by the light of each other.
+#[test]
+fn bonds_of_planned_layers_are_not_judged_one_by_one() {
+    let scratch = Scratch::new();
+    scratch.stack("stairs.tif", lamp_fixtures::cavity_staircase(1).layers());
+    let plan = "lamp plan speed stairs.tif --material pegda-sudan --search-gap 5% -q -o timed.tif";
+    scratch.run(plan).succeeds();
+    let ran = scratch.run("lamp check timed.tif --material pegda-sudan --only rules");
+    let text = String::from_utf8(ran.stdout).unwrap();
+    assert!(!text.contains("weak bond"), "{text}");
+    assert!(text.contains("not checked: bonds; layers are lit that cure only with"), "{text}");
+}
+
+/// Design rules of light need the resin: of the stack's record, or of an option; or a note names them.
+#[test]
+fn rules_of_light_take_the_resin_of_the_stack() {
+    let scratch = with("mug.stl", &mug(400));
+    let check = |line: &str| {
+        let ran = scratch.run(&format!("lamp check {line} --only rules"));
+        assert_eq!(ran.statuses, [Some(0)], "{line}");
+        String::from_utf8(ran.stdout).unwrap()
+    };
+    scratch.run(&format!("slice mug.stl {SLICE} -o plain.tif")).succeeds_quietly();
+    let unchecked = "note: design rules were not checked: closes, bonds; no resin is known";
+    assert!(check("plain.tif").contains(unchecked));
+    assert!(check(&format!("mug.stl {SLICE}")).contains(unchecked));
+    for (overcure, is_weak) in [(0.9, true), (1.0, true), (1.2, false)] {
+        let resin = format!("--material lamp-suspension --overcure {overcure}");
+        let ran = scratch.run(&format!("slice mug.stl {SLICE} {resin} -o of_resin.tif --force"));
+        assert_eq!(ran.statuses, [Some(0)]);
+        for line in [
+            format!("mug.stl {SLICE} {resin}"),
+            format!("plain.tif {resin}"),
+            "of_resin.tif".to_owned(),
+        ] {
+            let text = check(&line);
+            let has_line = text.contains("weak bond: layers 0 to 299");
+            assert_eq!(has_line, is_weak, "{line}: {text}");
+            // This resin states no cure widths.
+            let note = "note: design rules were not checked: closes; neither layers nor the resin";
+            assert!(text.contains(note), "{line}: {text}");
+        }
+    }
+}
+
+const RULES: &str = "name = 'wide'
+description = 'it'
+[[slot]]
+name = 'closes'
+cure-widths = 2
+source = 'it'
+[[bond]]
+name = 'bonds'
+source = 'it'
+";
+
+/// Cures 200 um deep at 738.9 mJ/cm2, where edges grow by 319.5 um.
+const RESIN: &str = r#"name = "mine"
+description = "cures wide"
+[intensity]
+value = "100 mW/cm2"
+source = "page 1"
+[working-curve]
+critical-dose = { value = "100 mJ/cm2", source = "page 1" }
+penetration-depth = { value = "100 um", source = "page 1" }
+[[cure-width]]
+feature-size = "1 mm"
+critical-dose = { value = "100 mJ/cm2", source = "page 1" }
+sensitivity = { value = "0.5 um/(mJ/cm2)", source = "page 1" }
+"#;
+
+/// A slot closes if it is narrower than twice the growth of edges at its layer's exposure time.
+#[test]
+fn slots_close_by_the_exposure_of_their_layers() {
+    let scratch = Scratch::new();
+    scratch.write("mine.toml", RESIN.as_bytes());
+    scratch.write("rules.toml", RULES.as_bytes());
+    // Slots 400 um and 1000 um wide.
+    let comb = drawn_mask([60, 40], |[x, y]| {
+        let is_slot = (20.0..24.0).contains(&x) || (36.0..46.0).contains(&x);
+        (5.0..55.0).contains(&x)
+            && (5.0..35.0).contains(&y)
+            && !(is_slot && (10.0..30.0).contains(&y))
+    });
+    for (ms, closed) in [(Some(7389.0), 1), (Some(3000.0), 0), (Some(14_000.0), 2), (None, 0)] {
+        let layer = |index: u32| {
+            let info = PageInfo {
+                index,
+                z_um: Some(f64::from(index) * 100.0),
+                thickness_um: Some(100.0),
+                exposure_ms: ms,
+                ..PageInfo::default()
+            };
+            Layer { info, pitch: Pitch::of_dpi(254.0), image: comb.clone().into() }
+        };
+        scratch.stack("comb.tif", (0..20).map(layer));
+        scratch.run("lamp check comb.tif --material mine.toml --rules rules.toml --report r.json --force").succeeds_quietly();
+        let found = report(&scratch, "r.json");
+        let slots = of_kind(&found, "slot");
+        assert_eq!(slots.len(), closed, "{ms:?}: {found}");
+        assert!(slots.iter().all(|slot| slot["rule"] == "closes"));
+        // Without a time, the dose just cures a layer, and bonds nothing.
+        assert_eq!(of_kind(&found, "weak-bond").len(), usize::from(ms.is_none()));
+    }
 }

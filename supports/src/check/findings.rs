@@ -294,13 +294,16 @@ pub struct WeakBond {
     pub layers: [u32; 2],
     /// The number of layers.
     pub count: u32,
-    /// The first of those that cure least deep for their thickness.
+    /// The first layer that cures least deep for its thickness.
     pub worst_layer: u32,
 }
 
 /// The effect of a layer's light, as full white has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LayerCure {
+    /// Whether it alone cures nothing, and light fades over more than a layer: the doses of several
+    /// layers are meant to add up, as planners have it.
+    pub needs_others: bool,
     /// The depth that cures, in micrometers.
     pub depth_um: Option<f64>,
     /// The distance by which each edge grows, in micrometers.

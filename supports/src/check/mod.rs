@@ -476,6 +476,9 @@ const JUST: f64 = 1e-3;
 
 /// Returns the layers that cure no deeper than each rule asks for.
 fn weak_bonds(layers: &[LayerFacts], rules: &[BondRule]) -> Vec<WeakBond> {
+    if layers.iter().any(|layer| layer.cure.needs_others) {
+        return Vec::new();
+    }
     // How deep a layer with white cures, in layers.
     let cured = |layer: &LayerFacts| {
         let depth = layer.cure.depth_um.filter(|_| layer.has_white)?;

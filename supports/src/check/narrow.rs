@@ -316,7 +316,7 @@ fn chains(
     }
 }
 
-/// Returns whether discs fill a chain of chords, given from its tip, but for what a corner leaves: one near
+/// Returns whether discs fill a chain of chords, given from its tip, except what a corner leaves: one near
 /// its tip, and all from there to its other end.
 fn is_corner_of_discs(mask: &Mask, chords: &[&Chord], limit: f64, metric: Metric) -> bool {
     let is_white = chords[0].is_white;
@@ -615,8 +615,8 @@ fn clearance(mask: &Mask, is_white: bool, [column, row]: [f64; 2], metric: Metri
     (nearest.0 - nearest.1).max(0.0)
 }
 
-/// Returns the distance in a row from a point to the center of the nearest pixel of the other color; none if
-/// there is none.
+/// Returns the distance in a row from a point to the center of the nearest pixel of the other color, if
+/// the row has one.
 fn aside(row: &[u32], is_white: bool, width: u32, column: f64) -> Option<f64> {
     let at = (column.floor().max(0.0) as u32).min(width - 1);
     let passed = row.partition_point(|&t| t <= at);

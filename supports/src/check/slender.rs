@@ -85,7 +85,7 @@ pub(super) struct Slenders {
     /// The greatest ratio and the greatest width in widths of a pixel of each rule.
     limits: Vec<[f64; 2]>,
     metric: Metric,
-    /// What the last layer continues, by its components.
+    /// Pins and holes that the last layer continues, by its components.
     live: BTreeMap<u32, Chain>,
     pub(super) ended: Listed<SlenderFeature>,
 }
@@ -249,7 +249,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// The breadth of a polygon is the least over many directions, and its extent that of two corners.
+        /// The breadth of a polygon is the least over many directions, and its extent the greatest.
         #[test]
         fn breadths_are_the_least_over_all_directions(
             corners in prop::collection::vec((0..60i64, 0..60i64), 8..30),

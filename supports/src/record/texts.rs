@@ -504,7 +504,7 @@ impl BondRecord {
         let Self { layer_count, worst_layer, rule, source, least_layers, .. } = self;
         write!(f, "{layers}{}", self.depth_text())?;
         if *layer_count > 1 {
-            write!(f, ", layer {worst_layer} of {layer_count} such layers")?;
+            write!(f, " in layer {worst_layer}, the worst of {layer_count} layers")?;
         }
         let plural = if *least_layers == 1.0 { "" } else { "s" };
         write!(f, ", no deeper than the {least_layers} layer{plural} of rule {rule} ({source})")?;

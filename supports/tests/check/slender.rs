@@ -123,6 +123,7 @@ impl LayerLight for Light {
         // One layer gets half of the light.
         let share = if layer.index == 7 { 0.5 } else { 1.0 };
         LayerCure {
+            needs_others: self.depth_um == 0.0,
             depth_um: Some(share * self.depth_um),
             width_um: Some(share * self.width_um),
             broadening_um: None,
@@ -182,6 +183,10 @@ fn a_layer_with_too_little_light_does_not_bond() {
     let all = WeakBond { rule: 1, layers: [0, 11], count: 11, worst_layer: 7 };
     assert_eq!(weak, [one, all]);
     layers[7].1 = black;
-    let weak = found(layers, &options).weak_bonds;
+    let weak = found(layers.clone(), &options).weak_bonds;
     assert_eq!(weak, [WeakBond { rule: 1, layers: [0, 11], count: 10, worst_layer: 0 }]);
+    // Layers that alone cure nothing are meant to cure together.
+    let none = Light { depth_um: 0.0, width_um: 0.0 };
+    let options = CheckOptions { light: Some(Arc::new(none)), ..options };
+    assert_eq!(found(layers, &options).weak_bonds, []);
 }

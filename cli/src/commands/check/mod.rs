@@ -321,9 +321,7 @@ fn printed(name: &str, found: &Found, all: bool) -> String {
         accepted => format!(", {accepted} accepted"),
     };
     let mut text = format!("{}: {layers}, {count}{specks}{accepted}\n", printable(name));
-    for note in found.whole_build().into_iter().chain(found.unchecked_rules()) {
-        text += &format!("  note: {note}\n");
-    }
+    text.extend(found.whole_build().map(|note| format!("  note: {note}\n")));
     let name_of = |feature: &Feature| found.records[feature.finding].name();
     for of_kind in found.features.chunk_by(|a, b| name_of(a) == name_of(b)) {
         let name = name_of(&of_kind[0]);
@@ -340,5 +338,6 @@ fn printed(name: &str, found: &Found, all: bool) -> String {
             text += &format!("  {name}: {left} more (--verbose or --report lists them)\n");
         }
     }
+    text.extend(found.unchecked_rules().into_iter().map(|note| format!("  note: {note}\n")));
     text
 }
