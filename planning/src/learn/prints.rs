@@ -1,6 +1,6 @@
 //! The prints of 004 chapter 3, simulated: its numbers, and the course of the errors.
 
-use lamp_fixtures::{Voxels, cavity_staircase, narrow_cross, square_prism};
+use lamp_fixtures::{SplitMix, Voxels, cavity_staircase, narrow_cross, square_prism};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::{Catalogued, Length};
@@ -304,10 +304,9 @@ fn hundreds_of_plants_are_learned_in_three_prints() {
     let (square, light) = (square_prism(0), pegda(100.0));
     let starts = [prism_times(4.0, &light, false).to_vec(), planned(&square, light)];
     let plants: usize = std::env::var("LAMP_PLANTS").map_or(200, |count| count.parse().unwrap());
-    let mut state = 1_u64;
+    let mut random = SplitMix(1);
     let mut uniform = |low: f64, high: f64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
+        low + (high - low) * (random.next() >> 11) as f64 / (1_u64 << 53) as f64
     };
     for number in 0..plants {
         let real = Plant {

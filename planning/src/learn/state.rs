@@ -7,6 +7,7 @@
 //! section 10.3). States are then tried around it, as far as the sum's curvature says.
 
 use std::collections::HashMap;
+use std::rc::Rc;
 
 use lamp_grayscale::material::{Given, Material};
 use lamp_grayscale::resin::{Intensity, Quantity};
@@ -46,7 +47,7 @@ const MOST: [f64; NUMBERS] = [1.2, 1.5, 1.2];
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Factor {
-    /// The most probable factor.
+    /// The mean over the probable states, of its logarithm.
     pub value: f64,
     /// The standard deviation of its natural logarithm.
     pub sd: f64,
@@ -209,7 +210,7 @@ pub(crate) struct Model<'a> {
     part: &'a TimedPart,
     light: Light,
     memory: u64,
-    edges_px: Vec<f64>,
+    edges_px: Rc<[f64]>,
     /// The last few spreads, with the light of measured pixels.
     known: Vec<Spreading<'a>>,
 }
@@ -225,7 +226,7 @@ const KEPT: usize = 6;
 
 impl<'a> Model<'a> {
     pub(crate) fn new(part: &'a TimedPart, light: &Light, memory: u64) -> Self {
-        let edges_px = part.edges_px();
+        let edges_px = part.edges_px().into();
         Self { part, light: *light, memory, edges_px, known: Vec::new() }
     }
 
@@ -270,7 +271,7 @@ impl<'a> Model<'a> {
             Edges::Gradual => (self.half_pixel(logs), EDGE_PX),
             Edges::Sharp => (SHARP, SHARP_EDGE_PX),
         };
-        let edges_px = std::mem::take(&mut self.edges_px);
+        let edges_px = Rc::clone(&self.edges_px);
         let light = shifted(&self.light, logs);
         let part = self.part;
         let known = self.at(logs)?;
@@ -322,7 +323,6 @@ impl<'a> Model<'a> {
                 }
             }
         }
-        self.edges_px = edges_px;
         Ok(all)
     }
 }
@@ -549,18 +549,14 @@ fn squares_of(predicted: &[Predicted], drift: f64) -> f64 {
 /// computed for each spread.
 fn root_of(covariance: &[[f64; NUMBERS]; NUMBERS]) -> [[f64; NUMBERS]; NUMBERS] {
     let order = [SPREAD, DEPTH, DOSE];
+    let mut factor: Vec<_> =
+        order.iter().flat_map(|&row| order.map(|column| covariance[row][column])).collect();
+    (0..NUMBERS).for_each(|k| factor[k * NUMBERS + k] += LEAST_VARIANCE);
+    // The solver leaves the Cholesky factor in its matrix.
+    solve_positive(&mut factor, vec![0.0; NUMBERS]);
     let mut root = [[0.0; NUMBERS]; NUMBERS];
-    for column in 0..NUMBERS {
-        for row in column..NUMBERS {
-            let [here, of] = [order[row], order[column]];
-            // L Lᵀ = C, column by column.
-            let left = covariance[here][of] - dot(&root[here][..column], &root[of][..column]);
-            root[here][column] = if row == column {
-                left.max(LEAST_VARIANCE).sqrt()
-            } else {
-                left / root[of][column]
-            };
-        }
+    for (row, number) in order.into_iter().enumerate() {
+        root[number][..=row].copy_from_slice(&factor[row * NUMBERS..=row * NUMBERS + row]);
     }
     root
 }
