@@ -77,7 +77,7 @@ const NEAR_PX: u32 = 2;
 /// not, heights to within a layer, areas or volumes to within 5 %, or the pixels of the box's rim if these
 /// are less than a quarter. Overhangs are alike if they are held alike, and reach as far, to within a quarter or 2 pixels, over
 /// as many layers, to within a quarter or 2 layers, and none is 2.5 times as large as the first: rows of pins
-/// and holes. So are narrow features by their widths and lengths. Copies that differ are alike if the first differs at most four times as much. Pixels are widths of
+/// and holes. So are narrow and slender features by their lengths, and by their widths to within half. Copies that differ are alike if the first differs at most four times as much. Pixels are widths of
 /// a pixel of this `pitch`; without one they are square.
 pub fn features<K: Clone + Eq + Hash>(
     records: &[FindingRecord],
@@ -308,8 +308,9 @@ struct Size {
     joins: bool,
     /// How an overhang is held; none of others.
     held_at: Option<HeldAt>,
-    /// Whether the first side, the layers and the amount decide, and may differ by much.
-    is_loose: bool,
+    /// The share by which the first side may differ, if it, the layers and the amount decide, and may
+    /// differ by much.
+    loose: Option<f64>,
 }
 
 impl Size {
@@ -334,16 +335,16 @@ impl Size {
         let mut sides = metric.place(sides).map(|side| side.round() as u32);
         // One may be turned.
         sides.sort_unstable();
-        let (mut held_at, mut is_loose) = (None, false);
+        let (mut held_at, mut loose) = (None, None);
         if let FindingRecord::Thin(narrow) | FindingRecord::Slot(narrow) = record {
-            (sides, is_loose) = ([narrow.width_px.round() as u32, 0], true);
+            (sides, loose) = ([narrow.width_px.round() as u32, 0], Some(0.5));
         }
         if let FindingRecord::Slender(slender) = record {
-            (sides, is_loose) = ([slender.width_px.round() as u32, 0], true);
+            (sides, loose) = ([slender.width_px.round() as u32, 0], Some(0.5));
         }
         if let FindingRecord::Overhang(overhang) = record {
             sides = [overhang.reach_px.round() as u32, 0];
-            (held_at, is_loose) = (Some(overhang.held_at), true);
+            (held_at, loose) = (Some(overhang.held_at), Some(0.25));
         }
         let [first, mut last] = record.layers();
         let (mut joins, mut share, mut may_differ) = (false, 0.0, 0.05);
@@ -357,13 +358,13 @@ impl Size {
             _ => {}
         }
         let (layers, amount) = (last.saturating_sub(first) + 1, amount as f64);
-        Some(Self { sides, layers, amount, may_differ, share, joins, held_at, is_loose })
+        Some(Self { sides, layers, amount, may_differ, share, joins, held_at, loose })
     }
 
     /// Returns the square of a grid of sizes in which it is. Overhangs and narrow features are in one: their leaders are few,
     /// as each is a quarter shorter than the one before.
     fn key(&self) -> [u32; 2] {
-        if self.is_loose { [0; 2] } else { self.sides.map(|side| side / NEAR_PX) }
+        if self.loose.is_some() { [0; 2] } else { self.sides.map(|side| side / NEAR_PX) }
     }
 
     /// Returns the squares in which sizes like it are.
@@ -374,13 +375,15 @@ impl Size {
     }
 
     fn is_like(&self, other: &Self) -> bool {
-        if self.is_loose {
-            let near = |a: u32, b: u32| a.abs_diff(b) <= NEAR_PX.max(a.max(b) / 4);
+        if let Some(share) = self.loose {
+            let near = |a: u32, b: u32, share: f64| {
+                a.abs_diff(b) <= NEAR_PX.max((share * f64::from(a.max(b))) as u32)
+            };
             // The other one came first.
             let is_larger = self.amount > 2.5 * other.amount;
             return self.held_at == other.held_at
-                && near(self.sides[0], other.sides[0])
-                && near(self.layers, other.layers)
+                && near(self.sides[0], other.sides[0], share)
+                && near(self.layers, other.layers, 0.25)
                 && !is_larger;
         }
         let sides = self.sides.iter().zip(other.sides).all(|(a, b)| a.abs_diff(b) <= NEAR_PX);

@@ -235,7 +235,7 @@ pub struct NarrowFeature {
     /// The first and the last layer.
     pub layers: [u32; 2],
     /// The least width of a layer in widths of a pixel: of each layer, the width that a tenth of its
-    /// middle line is below or at.
+    /// area is below or at.
     pub width: f64,
     /// The least width by the rule there, in widths of a pixel.
     pub limit: f64,

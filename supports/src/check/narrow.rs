@@ -45,7 +45,7 @@ const LEAST_TIP: f64 = 1.55;
 const AROUND: f64 = 3.2;
 
 /// The most rectangles of a color in which discs are tried. Dots have more, and each is narrow by design.
-const MOST_WINDOWS: usize = 2_000;
+const MOST_WINDOWS: usize = 20_000;
 
 /// The most tips that may turn out to be corners by a look at a few discs.
 const MOST_TIPS: u32 = 20_000;
@@ -63,7 +63,7 @@ pub(super) struct Narrow {
     pub(super) region: Region,
     /// Its rows and columns, from the top.
     pub(super) runs: Vec<(u32, Range<u32>)>,
-    /// The width that a tenth of its middle line is below or at, in widths of a pixel.
+    /// The width that a tenth of its area is below or at, in widths of a pixel.
     pub(super) width: f64,
     /// Its area over its median width, in widths of a pixel.
     pub(super) length: f64,
@@ -530,9 +530,10 @@ fn middles(own: &Mask, metric: Metric, limit: f64) -> Vec<[f64; 2]> {
     middles
 }
 
-/// Returns the width of runs that a tenth of their middle line is below or at, their median width, and
-/// the place of the first. The width of a place is the diameter of the largest disc that has it,
-/// around any place of the middle line.
+/// Returns the width of runs that a tenth of their area is below or at, the median of their middle line,
+/// and the place of the first. The width of a place is the diameter of the largest disc that has it, around any place of
+/// the middle line. A place of the middle line has as much area as its own disc is wide, so the corners
+/// of a blunt end count for little.
 fn width(
     own: &Mask,
     middles: &[[f64; 2]],
@@ -560,9 +561,9 @@ fn width(
     let slack = metric.longer_side();
     let greatest = discs.iter().map(|(_, radius)| *radius).fold(0.0, f64::max);
     let rows = metric.pixels(greatest + slack)[1];
-    let mut widths: Vec<(f64, [f64; 2])> = Vec::with_capacity(discs.len());
+    let mut widths: Vec<(f64, f64, [f64; 2])> = Vec::with_capacity(discs.len());
     let mut start = 0;
-    for (at, _) in &discs {
+    for (at, own) in &discs {
         while discs[start].0[1] < at[1] - rows {
             start += 1;
         }
@@ -574,11 +575,17 @@ fn width(
             })
             .map(|(_, radius)| *radius)
             .fold(0.0, f64::max);
-        widths.push((2.0 * largest, *at));
+        widths.push((2.0 * largest, *own, *at));
     }
     widths.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (width, at) = *widths.get(widths.len() / 10)?;
-    Some((width, widths[widths.len() / 2].0, at))
+    let median = widths.get(widths.len() / 2)?.0;
+    let mut left = 0.1 * widths.iter().map(|(_, own, _)| own).sum::<f64>();
+    let is_tenth = |(_, own, _): &&(f64, f64, [f64; 2])| {
+        left -= own;
+        left <= 0.0
+    };
+    let (width, _, at) = widths.iter().find(is_tenth)?;
+    Some((*width, median, *at))
 }
 
 /// Returns the distance of a point of a color, as column and row, from the nearest center of a pixel of the
@@ -644,7 +651,8 @@ mod tests {
         };
         let found = |side| narrow(&bars(side), [Some(8.0), None], Metric::of(None));
         assert!(found(130).is_some_and(|places| places.len() == 100));
-        assert_eq!(found(650), None);
+        assert!(found(650).is_some_and(|places| places.len() == 2500));
+        assert!(found(2600).is_none());
     }
 
     proptest! {

@@ -162,9 +162,11 @@ impl Slenders {
             });
             let [x, y] = [0, 1].map(|k| section.middle[k] - chain.middle[k]);
             let [x, y] = self.metric.place([x, y]);
+            let step = thickness.hypot(x.hypot(y));
             let mut stretch = Stretch {
                 first_layer: number,
-                below: chain.length,
+                // Its length begins at its first middle.
+                below: chain.length + step - thickness,
                 width: section.width,
                 widest_layer: number,
                 first: component.first,
@@ -180,7 +182,7 @@ impl Slenders {
                 }
             }
             chain.stretches.push(stretch);
-            chain.length += thickness.hypot(x.hypot(y));
+            chain.length += step;
             (chain.last_layer, chain.middle) = (number, section.middle);
             self.live.insert(section.component, chain);
         }

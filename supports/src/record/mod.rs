@@ -366,7 +366,7 @@ pub struct NarrowRecord {
     #[serde(flatten)]
     pub bounds: BoxRecord,
     /// The least width of a layer, in widths of a pixel: of each layer, the width that a tenth of its
-    /// middle line is below or at.
+    /// area is below or at.
     pub width_px: f64,
     /// The same in millimeters.
     pub width_mm: Option<f64>,

@@ -153,6 +153,25 @@ fn a_pin_has_the_width_where_it_is_narrowest() {
     assert!((14.0..16.0).contains(&pin.width), "{pin:?}");
 }
 
+/// A fin with a blunt end is as wide as it is drawn, at every angle and length: its corners are none of
+/// its width.
+#[test]
+fn corners_of_a_blunt_end_are_no_width() {
+    for degrees in [0.0, 10.0, 31.0, 45.0] {
+        for length in [45.0, 60.0, 150.0] {
+            let mask = drawn([400; 2], |at| {
+                let [x, y] = turned(at, 200.0, degrees);
+                let is_block = (100.0..160.0).contains(&x) && (y - 200.0).abs() < 80.0;
+                let is_fin = (150.0..160.0 + length).contains(&x) && (y - 200.0).abs() < 10.0;
+                is_block || is_fin
+            });
+            let findings = found(tall(&mask), LIMIT, lamp_pitch());
+            let [fin] = &findings.narrow.list[..] else { panic!("{degrees}: {findings:?}") };
+            assert!((18.0..=20.5).contains(&fin.width), "{degrees} {length}: {fin:?}");
+        }
+    }
+}
+
 /// A wall between two holes is narrow over a short way: shorter than a corner reaches.
 #[test]
 fn the_wall_between_two_holes_is_found() {

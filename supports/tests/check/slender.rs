@@ -101,6 +101,17 @@ fn stretches_count_by_their_widest_layer() {
     assert!((pin.length / pin.width - 4.5).abs() < 0.3, "{pin:?}");
 }
 
+/// A pin at the edge of a wide block has its height as its length: the way to it does not count.
+#[test]
+fn a_pin_off_the_middle_of_a_block_begins_on_it() {
+    let block = drawn([240; 2], |[x, y]| (x - 120.0).hypot(y - 120.0) < 100.0);
+    let pin = drawn([240; 2], |[x, y]| (x - 190.0).hypot(y - 150.0) < 10.0);
+    let layers = [vec![block; 40], vec![pin; 40]].concat();
+    let found = slender(layers, 2.0 * PIXEL_UM, 3.0);
+    let [pin] = &found[..] else { panic!("{found:?}") };
+    assert_eq!((pin.layers, pin.length), ([40, 79], 80.0));
+}
+
 /// A wall is no pin, and black that is open to the border is no hole.
 #[test]
 fn walls_and_open_black_are_no_pins() {
