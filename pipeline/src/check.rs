@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
+use std::fmt;
 use std::num::{NonZeroU8, NonZeroU32};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -22,7 +23,7 @@ use crate::stack_light::{NoLight, StackLight};
 use crate::words::{list, optional, path, text, words_of};
 
 /// Changes when other findings come of the same settings and stack.
-pub const CODE: u32 = 4;
+pub const CODE: u32 = 5;
 
 /// The findings to look for, and their limits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -153,7 +154,7 @@ impl CheckSettings {
         decode: impl Fn(T) -> Result<Layer, E> + Sync,
         machine: Option<&Machine>,
     ) -> Result<Found, E> {
-        let (light, no_light) = known(light);
+        let (light, resin) = known(light);
         let options = self.options(light)?;
         let (findings, differing) = match &build {
             Ok(build) => self.find_in_build(build, layers, decode, &options)?,
@@ -167,7 +168,7 @@ impl CheckSettings {
                 &of_settings
             }
         };
-        Ok(self.found(findings, &Disagreements::default(), differing, build, no_light, machine))
+        Ok(self.found(findings, &Disagreements::default(), differing, build, resin, machine))
     }
 
     /// Returns what was found, as people and programs read it.
@@ -177,7 +178,7 @@ impl CheckSettings {
         disagreements: &Disagreements,
         differing: Vec<CopyRecord>,
         build: Result<BuildCopies, Inseparable>,
-        no_light: Option<NoLight>,
+        resin: Result<String, NoLight>,
         machine: &Machine,
     ) -> Found {
         let mut records = self.records(&findings, disagreements, machine);
@@ -193,7 +194,7 @@ impl CheckSettings {
             records.splice(at..at, differing);
         }
         let mut found =
-            Found { findings, records, features: Vec::new(), accepted: 0, build, no_light };
+            Found { findings, records, features: Vec::new(), accepted: 0, build, resin };
         found.group();
         found
     }
@@ -289,15 +290,34 @@ pub struct Found {
     pub accepted: usize,
     /// The copies of a build, or why the stack was checked as it stands.
     pub build: Result<BuildCopies, Inseparable>,
-    /// Why the light of layers is not known, if it is not.
-    pub no_light: Option<NoLight>,
+    /// The resin that the light of layers cures, or why none is known.
+    pub resin: Result<String, NoLight>,
 }
 
-/// Returns the light, or why it is not known.
-pub fn known(light: Result<StackLight, NoLight>) -> (Option<StackLight>, Option<NoLight>) {
+/// Returns the light, if it is known, and its resin, or why none is known.
+pub fn known(light: Result<StackLight, NoLight>) -> (Option<StackLight>, Result<String, NoLight>) {
     match light {
-        Ok(light) => (Some(light), None),
-        Err(why) => (None, Some(why)),
+        Ok(light) => {
+            let resin = light.resin().to_owned();
+            (Some(light), Ok(resin))
+        }
+        Err(why) => (None, Err(why)),
+    }
+}
+
+/// Design rules that were not checked, in all layers or in some.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct UncheckedRules {
+    /// The names of the rules.
+    pub rules: Vec<String>,
+    /// Why they were not checked.
+    pub why: String,
+}
+
+impl fmt::Display for UncheckedRules {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "design rules were not checked: {}; {}", self.rules.join(", "), self.why)
     }
 }
 
@@ -357,62 +377,76 @@ impl Found {
         Some(format!("each copy and the build mesh were checked as they stand: {why}"))
     }
 
-    /// Returns sentences on design rules that were not checked, in all layers or in some.
-    pub fn unchecked_rules(&self) -> Vec<String> {
+    /// Returns the design rules that were not checked, in all layers or in some.
+    pub fn unchecked_rules(&self) -> Vec<UncheckedRules> {
         let Findings { layers, pitch, widths, bonds, aspects, .. } = &self.findings;
-        let mut notes = Vec::new();
-        let textures = layers.iter().filter(|layer| layer.is_texture).count();
-        if textures > 0 {
-            let plural = if textures == 1 { "layer" } else { "layers" };
-            notes.push(format!(
-                "rules of widths were not checked in {textures} {plural} with thousands of narrow \
-                 places, as dots are"
-            ));
-        }
-        let mut unchecked = |names: Vec<&str>, why: &str| {
-            if !names.is_empty() {
-                let names = names.join(", ");
-                notes.push(format!("design rules were not checked: {names}; {why}"));
+        let mut all = Vec::new();
+        let mut unchecked = |rules: Vec<&str>, why: String| {
+            if !rules.is_empty() {
+                let rules = rules.into_iter().map(str::to_owned).collect();
+                all.push(UncheckedRules { rules, why });
             }
         };
+        let textures = layers.iter().filter(|layer| layer.is_texture).count();
+        if textures > 0 {
+            let names = widths.iter().map(|rule| rule.name.as_str()).collect();
+            let have = if textures == 1 { "layer has" } else { "layers have" };
+            let why = format!("{textures} {have} thousands of narrow places, as dots are");
+            unchecked(names, why);
+        }
         let of_light = widths.iter().filter(|it| matches!(it.least, LeastWidth::CureWidths(_)));
         let of_light: Vec<&str> = of_light.map(|rule| rule.name.as_str()).collect();
         if pitch.is_none() {
             let lengths = widths.iter().filter(|it| matches!(it.least, LeastWidth::Length(_)));
             let lengths = lengths.map(|rule| rule.name.as_str()).chain(of_light.iter().copied());
-            let all = lengths.chain(aspects.iter().map(|rule| rule.name.as_str())).collect();
-            unchecked(all, "the stack states no resolution");
+            let names = lengths.chain(aspects.iter().map(|rule| rule.name.as_str())).collect();
+            unchecked(names, "the stack states no resolution".to_owned());
         } else if !layers.iter().any(|layer| layer.thickness_um.is_some()) {
             let names = aspects.iter().map(|rule| rule.name.as_str()).collect();
-            unchecked(names, "the stack states no heights");
+            unchecked(names, "the stack states no heights".to_owned());
         }
         let of_bonds: Vec<&str> = bonds.iter().map(|rule| rule.name.as_str()).collect();
-        if let Some(NoLight(why)) = &self.no_light {
-            let of_light = of_light.iter().copied().filter(|_| pitch.is_some());
-            unchecked(of_light.chain(of_bonds).collect(), why);
-            return notes;
-        }
-        let white = || layers.iter().filter(|layer| layer.has_white);
-        let mut lacking = |names: &[&str], has: &dyn Fn(&LayerFacts) -> bool, what: &str| {
-            let (without, all) = (white().filter(|layer| !has(layer)).count(), white().count());
-            if without > 0 {
-                let which =
-                    if without == all { "layers".into() } else { format!("{without} layers") };
-                unchecked(names.to_vec(), &format!("neither {which} nor the resin state {what}"));
+        let resin = match &self.resin {
+            Ok(resin) => resin,
+            Err(NoLight(why)) => {
+                let of_light = of_light.iter().copied().filter(|_| pitch.is_some());
+                unchecked(of_light.chain(of_bonds).collect(), why.clone());
+                return all;
             }
         };
-        if pitch.is_some() {
-            lacking(&of_light, &|layer| layer.cure.width_um.is_some(), "a dose and its cure width");
+        let white = || layers.iter().filter(|layer| layer.has_white);
+        let count = |has: &dyn Fn(&LayerFacts) -> bool| white().filter(|layer| has(layer)).count();
+        let has_depth = |layer: &LayerFacts| layer.cure.depth_um.is_some();
+        let lacking = |without: usize, what: &str| {
+            let which = match without {
+                0 => return None,
+                _ if without == white().count() => "the layers".to_owned(),
+                1 => "1 layer".to_owned(),
+                _ => format!("{without} layers"),
+            };
+            Some(format!("neither {resin} nor {which} state {what}"))
+        };
+        let has_width = |layer: &LayerFacts| layer.cure.width_um.is_some();
+        let why = if count(&has_width) == 0 && count(&has_depth) > 0 {
+            Some(format!("{resin} states no cure width"))
+        } else {
+            lacking(count(&|layer| !has_width(layer)), "a dose and its cure width")
+        };
+        if let Some(why) = why.filter(|_| pitch.is_some()) {
+            unchecked(of_light, why);
         }
         if layers.iter().any(|layer| layer.cure.needs_others) {
-            let why = "layers are lit that cure only with the light of others: lamp cure shows what cures";
-            unchecked(of_bonds, why);
-            return notes;
+            let why = "layers are lit that cure only with the light of others: lamp cure shows \
+                       what cures";
+            unchecked(of_bonds, why.to_owned());
+            return all;
         }
-        let has_depth =
-            |layer: &LayerFacts| layer.cure.depth_um.is_some() && layer.thickness_um.is_some();
-        lacking(&of_bonds, &has_depth, "a dose and its cure depth, and a thickness");
-        notes
+        let has_bond = |layer: &LayerFacts| has_depth(layer) && layer.thickness_um.is_some();
+        let what = "a dose and its cure depth, and a thickness";
+        if let Some(why) = lacking(count(&|layer| !has_bond(layer)), what) {
+            unchecked(of_bonds, why);
+        }
+        all
     }
 
     /// Returns the line about a feature, without the name of its kind.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use lamp_grayscale::exposure::Exposure;
+use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Dose, ExposureTime};
 use lamp_stack::{Length, PageInfo};
 use lamp_supports::{LayerCure, LayerLight};
@@ -13,7 +14,10 @@ use crate::slice_settings::SlicingRecord;
 
 /// The resin of a stack, and how its layers are exposed.
 #[derive(Debug)]
-pub struct StackLight(Exposure);
+pub struct StackLight {
+    exposure: Exposure,
+    resin: Material,
+}
 
 /// Why the light of layers is not known, as the end of a sentence.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,16 +26,21 @@ pub struct NoLight(pub String);
 const NO_RESIN: &str = "no resin is known: --material";
 
 impl StackLight {
+    /// Returns the name of the resin.
+    pub fn resin(&self) -> &str {
+        &self.resin.name
+    }
+
     /// Returns the light by settings: of the layers that these slice, or of a stack.
     ///
     /// # Errors
     /// Returns an error if the material cannot be read, or says no cure depth.
     pub fn of_settings(settings: &ExposureSettings) -> Result<Result<Self, NoLight>, Error> {
         Ok(match settings.exposure()? {
-            Some(recorded) if recorded.exposure.material().is_some() => Ok(Self(recorded.exposure)),
-            Some(recorded) => {
-                Err(NoLight(format!("{} has exposure times and no resin", recorded.word)))
-            }
+            Some(recorded) => match recorded.exposure.material().cloned() {
+                Some(resin) => Ok(Self { exposure: recorded.exposure, resin }),
+                None => Err(NoLight(format!("{} has exposure times and no resin", recorded.word))),
+            },
             None => Err(NoLight(NO_RESIN.to_owned())),
         })
     }
@@ -57,23 +66,22 @@ impl StackLight {
 impl LayerLight for StackLight {
     /// The dose comes from the page's exposure time, or else from the material.
     fn cure(&self, layer: &PageInfo) -> LayerCure {
-        let Self(exposure) = self;
-        let Some(material) = exposure.material() else { return LayerCure::default() };
+        let Self { exposure, resin } = self;
         // Damaged pages may have other numbers.
         let thickness = layer.thickness_um.filter(|um| um.is_finite() && *um > 0.0);
         let thickness = thickness.map(Length::from_um);
         let time = layer.exposure_ms.filter(|ms| ms.is_finite() && *ms >= 0.0);
-        let light = material.light().ok().flatten();
+        let light = resin.light().ok().flatten();
         let dose = match (time, light) {
             (Some(ms), Some(light)) => Some(light * ExposureTime::from_ms(ms)),
             _ => thickness.and_then(|thickness| exposure.dose(thickness).ok().flatten()),
         };
         let width = |dose: Dose| {
-            let [x, y] = material.edge_growth(dose, thickness).ok().flatten()?;
+            let [x, y] = resin.edge_growth(dose, thickness).ok().flatten()?;
             // Edges that draw back close nothing.
             Some(x.um().max(y.um()).max(0.0))
         };
-        let fades_over = material.working_curve().ok().flatten().map(|it| it.penetration_depth());
+        let fades_over = resin.working_curve().ok().flatten().map(|it| it.penetration_depth());
         let reaches_on =
             fades_over.zip(thickness).is_some_and(|(depth, thickness)| depth > thickness);
         let depth_um = dose.and_then(|dose| exposure.depth(dose)).map(Length::um);

@@ -105,7 +105,7 @@ impl ReaderSettings {
 #[cfg(not(feature = "occt"))]
 pub fn without_occt(option: &str) -> Error {
     Error::settings(format!(
-        "this build is without OpenCASCADE: leave out {option}, or build with --features occt"
+        "this build is without OpenCASCADE: build with --features occt, or leave out {option}, which IGES needs"
     ))
 }
 

@@ -79,8 +79,9 @@ class Feature(Record):
 class Findings(list[Feature]):
     """What a check found, the worst first: a list of features.
 
-    `needs_a_person` counts the features that are more than notes. `all` lists every finding, and
-    `specks` lists islands too small to matter.
+    `needs_a_person` counts the features that are more than notes. `all` lists every finding,
+    `specks` lists islands too small to matter, and `unchecked_rules` has a line for design rules that
+    were not checked, with the reason.
     """
 
     layers: int
@@ -89,6 +90,7 @@ class Findings(list[Feature]):
     specks: list[Finding]
     left_out: int
     note: Optional[str]
+    unchecked_rules: list[str]
     reports: list[Record]
 
     def __init__(self, found: Record, reports: list[Record]) -> None:
@@ -96,6 +98,7 @@ class Findings(list[Feature]):
         self.needs_a_person = found["count"]
         self.left_out = found["left_out"]
         self.note = found["note"]
+        self.unchecked_rules = found["unchecked_rules"]
         self.all = [Finding(finding) for finding in found["findings"]]
         self.specks = [Finding(speck) for speck in found["specks"]]
         self.reports = reports

@@ -80,6 +80,7 @@ fn report_of(found: &Found, shear_pa: Option<f64>) -> Value {
         "count": found.count(),
         "left_out": found.findings.left_out(),
         "note": found.whole_build(),
+        "unchecked_rules": found.unchecked_rules().iter().map(ToString::to_string).collect::<Vec<_>>(),
         "features": features.collect::<Vec<_>>(),
         "findings": findings.collect::<Vec<_>>(),
         "specks": specks.collect::<Vec<_>>(),

@@ -178,6 +178,10 @@ def test_a_check_finds_what_the_program_finds(tmp_path, stack, program):
         for finding in theirs["findings"]
     ]
     assert ours.needs_a_person == theirs["inputs"][0]["findings"]
+    unchecked = theirs["inputs"][0]["unchecked_rules"]
+    assert [", ".join(it["rules"]) + "; " + it["why"] for it in unchecked] == [
+        line.split("not checked: ")[1] for line in ours.unchecked_rules
+    ]
 
 
 def test_a_scene_of_trimesh_is_no_mesh(mesh):

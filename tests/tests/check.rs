@@ -447,7 +447,8 @@ fn rules_of_light_take_the_resin_of_the_stack() {
             let has_line = text.contains("weak bond: layers 0 to 299");
             assert_eq!(has_line, is_weak, "{line}: {text}");
             // This resin states no cure widths.
-            let note = "note: design rules were not checked: closes; neither layers nor the resin";
+            let note =
+                "note: design rules were not checked: closes; lamp-suspension states no cure width";
             assert!(text.contains(note), "{line}: {text}");
         }
     }

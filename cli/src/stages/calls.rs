@@ -88,7 +88,7 @@ pub(crate) struct Checking(CheckSettings);
 pub(crate) struct CheckFindings {
     /// The number of features of each kind that need a person.
     pub(crate) kinds: BTreeMap<String, usize>,
-    /// A line for each feature, also for notes, the worst first.
+    /// A line for each feature, also for notes, the worst first; then for rules that were not checked.
     pub(crate) lines: Vec<String>,
     /// The same as in the report of `lamp check`, without the input's number.
     pub(crate) findings: Vec<FindingRecord>,
@@ -139,6 +139,7 @@ impl Checking {
             }
             found.lines.push(format!("{name}: {}", all.text(feature)));
         }
+        found.lines.extend(all.unchecked_rules().iter().map(|rules| format!("note: {rules}")));
         found.findings = all.records;
         Ok(found)
     }

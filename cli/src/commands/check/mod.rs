@@ -42,9 +42,11 @@ use report::write_report;
 ///
 /// An island is a white area that rests on nothing: the recoating blade sweeps it away. Each island
 /// gets a line, as do weak joints, pockets that hold resin, overhangs, features narrower than design
-/// rules allow, unbalanced bodies, white at the border and empty layers; the worst come first. A part is sliced first, with the options of
-/// `slice`; its mesh also shows where islands must be. Only the report lists effects of rounding to
-/// pixels, and islands that are neither as wide as --speck nor float for --speck-layers.
+/// rules allow, unbalanced bodies, white at the border and empty layers; the worst come first. Bonds
+/// between layers and slots that close are judged by the resin: the stack's, or --material. A part
+/// is sliced first, with the options of `slice`; its mesh also shows where islands must be. Only the
+/// report lists effects of rounding to pixels, and islands that are neither as wide as --speck nor
+/// float for --speck-layers.
 #[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
@@ -201,12 +203,12 @@ impl CheckArgs {
                     progress.layer_done();
                     Ok::<_, Exit>(layer)
                 };
-                let (light, no_light) = known(StackLight::of_settings(&part.settings.exposure)?);
+                let (light, resin) = known(StackLight::of_settings(&part.settings.exposure)?);
                 let options = self.settings.options(light)?;
                 let findings = lamp_supports::check(layers, decode, &options)?;
                 let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
                 let build = Err(Inseparable::NoBuild);
-                self.settings.found(findings, &disagreements, Vec::new(), build, no_light, machine)
+                self.settings.found(findings, &disagreements, Vec::new(), build, resin, machine)
             }
         };
         progress.done();

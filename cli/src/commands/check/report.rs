@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use lamp_machine::Recoating;
+use lamp_pipeline::check::UncheckedRules;
 use lamp_stack::Pitch;
 use lamp_supports::{Feature, FindingRecord, IslandRecord, Scale};
 use serde::Serialize;
@@ -38,6 +39,8 @@ struct InputLine<'a> {
     accepted: usize,
     /// Of a build: why it is checked as it stands.
     note: Option<String>,
+    /// The design rules that were not checked, in all layers or in some.
+    unchecked_rules: Vec<UncheckedRules>,
     /// Number of findings and specks that the lists leave out.
     left_out: u64,
 }
@@ -68,6 +71,7 @@ pub(super) fn write_report(
             specks: findings.specks.count(),
             accepted: checked.found.accepted,
             note: checked.found.whole_build(),
+            unchecked_rules: checked.found.unchecked_rules(),
             left_out: findings.left_out(),
         }
     });

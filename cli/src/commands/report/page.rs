@@ -166,7 +166,7 @@ fn findings(Drawn { found, pictures }: &Drawn) -> Markup {
                 }
             }
         }
-        @for note in found.unchecked_rules() { p.note { "In lamp check, " (printable(&note)) "." } }
+        @for note in found.unchecked_rules() { p.note { "In lamp check, " (printable(&note.to_string())) "." } }
         @if specks > 0 { p.note { (specks) " specks: islands too small to count." } }
     }
 }
