@@ -120,7 +120,7 @@ pub(crate) struct CheckStageArgs {
         "White areas that rest on little",
         "Black spaces without a way out",
         "White areas far from the white below",
-        "Walls, pins, slots and holes that break a design rule",
+        "Features and layers that break a design rule",
         "Centers of gravity outside the part's base",
         "Stray rows, white at the border, empty layers",
     ]))]
@@ -160,7 +160,8 @@ pub(crate) struct CheckStageArgs {
     #[arg(long, value_name = "MACHINE", default_value = "alpha")]
     machine: PathBuf,
 
-    /// Design rules for the widths of walls, pins, slots and holes: lamp-mould, none or a file
+    /// Design rules: widths of walls, pins, slots and holes, bonds between layers, and lengths of
+    /// pins and holes. lamp-mould, none or a file (docs/check.md)
     #[arg(long, value_name = "RULES", default_value = "lamp-mould")]
     rules: PathBuf,
 }

@@ -134,6 +134,7 @@ impl StackReport {
         stack: &IndexedStack,
         name: &str,
         machine: Option<&Machine>,
+        settings: &CheckSettings,
         clock: BuildClock,
         progress: &Progress,
     ) -> Result<Self, Exit> {
@@ -165,7 +166,7 @@ impl StackReport {
             });
         let build = BuildCopies::of(&headers[0].info, headers[0].size);
         let light = StackLight::of_stack(Some(&headers[0].info), &[Path::new("")]);
-        let found = match CheckSettings::default().find(build, light, &mut layers, Ok, machine) {
+        let found = match settings.find(build, light, &mut layers, Ok, machine) {
             Ok(found) => Ok(found),
             // A stack that cannot be checked still has numbers and pictures.
             Err(error) => match error.cause::<CheckError>() {

@@ -28,6 +28,7 @@ use crate::streams::{
     write_file,
 };
 use crate::terminal::progress::Progress;
+use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::documents;
 
 use gather::{ReportedStack, StackReport};
@@ -38,7 +39,8 @@ pub(super) use pictures::{InlinePicture, of_layer};
 ///
 /// The page is one HTML file that needs no network and no script, and prints on A4 and letter. For
 /// a folder of stacks, -o names a folder, which gets a page for each stack and an index.html.
-/// Numbers equal the numbers from `lamp info` and from `lamp check` with its usual options.
+/// Numbers equal the numbers from `lamp info` and from `lamp check` with the same design rules and
+/// its usual options.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -63,6 +65,11 @@ pub(crate) struct ReportArgs {
     /// counts in the build time, and its blade drags on floating features
     #[arg(long, value_name = "MACHINE")]
     machine: Option<PathBuf>,
+
+    /// Design rules: widths of walls, pins, slots and holes, bonds between layers, and lengths of
+    /// pins and holes. lamp-mould, none or a file (docs/check.md)
+    #[arg(long, value_name = "RULES", default_value_os_t = CheckSettings::default().rules)]
+    rules: PathBuf,
 
     #[command(flatten)]
     times: TimeArgs,
@@ -89,6 +96,7 @@ pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
     let work = ReportWork {
         machine: machine.as_ref(),
         machine_path: args.machine.as_deref(),
+        rules: &args.rules,
         times: args.times,
         common,
     };
@@ -114,6 +122,7 @@ pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
 struct ReportWork<'a> {
     machine: Option<&'a Machine>,
     machine_path: Option<&'a Path>,
+    rules: &'a Path,
     times: TimeArgs,
     common: &'a Common,
 }
@@ -128,6 +137,7 @@ impl ReportWork<'_> {
             &stack,
             &shown_name(path),
             self.machine,
+            &CheckSettings { rules: self.rules.to_owned(), ..CheckSettings::default() },
             build_clock(self.machine_path, self.machine, self.times)?,
             &progress,
         );
