@@ -26,6 +26,9 @@ pub enum TargetError {
     /// There are no lines or too many.
     #[error("the widths of lines must be 1 to 50")]
     Lines,
+    /// There are no gray levels or too many.
+    #[error("the gray levels must be 1 to 20")]
+    Levels,
     /// A length in pixels is zero or too large.
     #[error("{what} of {pixels} pixels: they have 1 to {most}")]
     Pixels {
@@ -44,6 +47,7 @@ const MAX_PIXELS: u32 = 50_000;
 const MAX_TILE: u32 = 5_000;
 const MAX_DOSES: usize = 100;
 const MAX_LINES: usize = 50;
+const MAX_LEVELS: usize = 20;
 /// The most rows of a target of lines: more than any machine's.
 const MAX_ROWS: u32 = 200_000;
 
@@ -261,6 +265,34 @@ pub fn screens(
     Ok(image)
 }
 
+/// Makes squares of gray levels, side by side from the left, with `gap` pixels between and around them
+/// (001 figure 5).
+///
+/// # Errors
+/// Returns an error if there are no levels or too many, or if a length is zero or too large.
+pub fn gray_squares(levels: &[GrayLevel], side: u32, gap: u32) -> Result<GrayMask, TargetError> {
+    check_pixels("squares", side, MAX_TILE)?;
+    check_pixels("gaps", gap, MAX_TILE)?;
+    if !(1..=MAX_LEVELS).contains(&levels.len()) {
+        return Err(TargetError::Levels);
+    }
+    let width = gap + levels.len() as u32 * (side + gap);
+    let mut image = GrayMask::new(width.next_multiple_of(WIDTH_STEP));
+    let runs = || {
+        let squares = levels.iter().flat_map(|level| [(side, level.to_u8()), (gap, 0)]);
+        std::iter::once((gap, 0)).chain(squares).collect()
+    };
+    let rows = [
+        vec![Vec::new(); gap as usize],
+        vec![runs(); side as usize],
+        vec![Vec::new(); gap as usize],
+    ];
+    for row in rows.into_iter().flatten() {
+        image.push_runs(row).expect("squares are within the width");
+    }
+    Ok(image)
+}
+
 /// Returns a square's rank among the 64 of its 8 x 8. Ranks below the level's 64ths are
 /// white. In this order, Bayer's, the first 32 make a checkerboard.
 fn bayer_rank(x: u32, y: u32) -> u32 {
@@ -274,6 +306,21 @@ mod tests {
 
     fn doses(mj: &[f64]) -> Vec<Dose> {
         mj.iter().copied().map(Dose::from_mj_per_cm2).collect()
+    }
+
+    #[test]
+    fn gray_squares_stand_side_by_side() {
+        let levels = [1.0, 0.25].map(|level| GrayLevel::new(level).unwrap());
+        let image = gray_squares(&levels, 3, 2).unwrap();
+        let row = |y: u32| (0..12).map(|x| image.level(x, y)).collect::<Vec<_>>();
+        assert_eq!((image.width(), image.height()), (32, 7));
+        for y in 0..7 {
+            let is_lit = (2..5).contains(&y);
+            let lit = [0, 0, 255, 255, 255, 0, 0, 64, 64, 64, 0, 0];
+            assert_eq!(row(y), if is_lit { lit } else { [0; 12] }, "{y}");
+        }
+        assert_eq!(gray_squares(&[], 3, 2), Err(TargetError::Levels));
+        assert!(gray_squares(&levels, 0, 2).is_err() && gray_squares(&levels, 3, 9999).is_err());
     }
 
     #[test]

@@ -7,7 +7,7 @@ use lamp_fixtures::{Sample, cavity_staircase};
 use lamp_tests::{Scratch, workspace_root};
 
 /// Commands whose measurements another test makes.
-const ELSEWHERE: [&str; 1] = ["lamp calibrate scan"];
+const ELSEWHERE: [&str; 2] = ["lamp calibrate scan", "lamp calibrate spread"];
 
 /// Returns the columns that the book gives, and the axes of each command.
 fn in_the_book() -> (String, BTreeSet<[String; 3]>) {

@@ -1,5 +1,6 @@
 //! Checks that `lamp target scan`, `lamp calibrate scan` and `lamp compensate` agree on light that
-//! spreads differently along and across the scan, with prints simulated by closed forms.
+//! spreads differently along and across the scan, and `lamp calibrate spread` on squares seen from the
+//! side, with prints simulated by closed forms.
 
 use std::fmt::Write as _;
 
@@ -262,4 +263,61 @@ fn a_compensated_block_prints_at_its_size_in_both_directions() {
     scratch.run(grown).succeeds_quietly();
     let mixed = "lamp compensate block.tif --uniform -25x40um -o out.tif";
     scratch.run(mixed).is_wrong_usage(&["give both alike"]);
+}
+
+/// Squares of four gray levels, simulated and measured from the side, give the light back, and a material that
+/// planners take.
+#[test]
+fn profiles_of_squares_give_their_light_back() {
+    let scratch = Scratch::new();
+    let grays = "lamp target grays --dpi 1500 --square 500um --expose 4s -o grays.tif";
+    scratch.run(grays).succeeds();
+    let pages = scratch.layers("grays.tif");
+    let Image::Gray(image) = &*pages[0].image else { panic!("it is gray") };
+    let row: Vec<[u32; 2]> = image.row(70).iter().map(|it| [it.column, it.level.into()]).collect();
+    // 59 pixels of gap and 30 of square.
+    let levels =
+        [[59, 255], [89, 0], [148, 191], [178, 0], [237, 128], [267, 0], [326, 64], [356, 0]];
+    assert_eq!(row, levels);
+    let [sigma, fading, gamma, critical, dose, side] = [60.0, 125.0, 1.8, 20.0, 600.0, 500.0];
+    let mut noise = SplitMix(11);
+    let square = [[-side / 2.0, side / 2.0, 1.0]];
+    let mut table = "gray,side_um,x_um,depth_um,dose_mj_per_cm2\n".to_owned();
+    let mut undosed = "gray,side_um,x_um,depth_um\n".to_owned();
+    for gray in [1.0, 0.75, 0.5, 0.25] {
+        for step in -7..=7 {
+            let at = f64::from(step) * 50.0;
+            let share = light(&square, sigma, at) * light(&square, sigma, 0.0);
+            let depth = fading * (dose * f64::powf(gray, gamma) * share / critical).ln();
+            let [x, depth] = [at, depth].map(|um| um + 4.0 * noise.normal());
+            let depth = depth.max(0.0);
+            writeln!(table, "{gray},{side},{x:.1},{depth:.1},{dose}").unwrap();
+            writeln!(undosed, "{gray},{side},{x:.1},{depth:.1}").unwrap();
+        }
+    }
+    scratch.write("profiles.csv", table.as_bytes());
+    scratch.write("light.csv", undosed.as_bytes());
+    let fit = "lamp calibrate spread profiles.csv --intensity 20mW/cm2 -o mine.toml --plot fit.csv --report fit.json";
+    scratch.run(fit).succeeds();
+    is_as_in_the_book(&scratch, "lamp calibrate spread", "fit.csv");
+    let answer: Value = serde_json::from_slice(&scratch.bytes("fit.json")).unwrap();
+    let holds = |name: &str, truth: f64| {
+        let all = answer["parameters"].as_array().unwrap();
+        let number = all.iter().find(|it| it["name"] == name).unwrap();
+        let [low, high] = ["low", "high"].map(|end| number[end].as_f64().unwrap());
+        assert!(low < truth && truth < high, "{number}");
+        assert!((number["value"].as_f64().unwrap() / truth - 1.0).abs() < 0.1, "{number}");
+    };
+    for (name, truth) in [("sigma", sigma), ("Dp", fading), ("gamma", gamma), ("Ec", critical)] {
+        holds(name, truth);
+    }
+    let toml = String::from_utf8(scratch.bytes("mine.toml")).unwrap();
+    for part in ["[spread]", "[gamma]", "working-curve"] {
+        assert!(toml.contains(part), "{toml}");
+    }
+    scratch.run("lamp material check mine.toml").succeeds();
+    // Without doses, the working curve stays as it is.
+    scratch.run("lamp calibrate spread light.csv -o light.toml").succeeds();
+    let toml = String::from_utf8(scratch.bytes("light.toml")).unwrap();
+    assert!(toml.contains("[spread]") && !toml.contains("working-curve"), "{toml}");
 }

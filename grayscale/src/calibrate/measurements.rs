@@ -172,6 +172,8 @@ const SIZE: &str = "feature_um";
 const CURED: &str = "cured_um";
 const WIDTH: &str = "width_um";
 const DIRECTION: &str = "direction";
+const SIDE: &str = "side_um";
+const PLACE: &str = "x_um";
 const KIND: &str = "kind";
 const ABSORBER: &str = "uv_absorber_g_per_100g";
 const LAYERS: &str = "layers";
@@ -451,6 +453,63 @@ pub fn line_points(
     })
 }
 
+/// A point at the edge of a square's light, seen from the side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProfilePoint {
+    /// The gray level of the square.
+    pub gray: GrayLevel,
+    /// The side of the square in the image.
+    pub side: Length,
+    /// The place, from the middle of the square.
+    pub place: Length,
+    /// How deep the edge is there.
+    pub depth: Length,
+    /// The dose of white in a wide field, if the edge is of a cured square.
+    pub dose: Option<Dose>,
+}
+
+/// Reads the edges of squares seen from the side from a table of `gray`, the level from 0 (black) to 1
+/// (white), white if that is absent; `side_um`, the square's side; `x_um`, the place from its middle;
+/// `depth_um`; and, of cured squares, `dose_mj_per_cm2` or, under a light, `exposure_ms`. Rows of depth
+/// zero or below are beyond the edge.
+///
+/// # Errors
+/// Returns an error if a column is missing or unknown, or a cell is not a number in its range.
+pub fn profile_points(
+    table: &CsvTable,
+    light: Option<Intensity>,
+) -> Result<Measured<ProfilePoint>, DataError> {
+    check_columns(table, &[GRAY, SIDE, PLACE, DEPTH, DOSE, EXPOSURE])?;
+    let needed = |name| Column::find(table, name).ok_or(DataError::NoColumn(name));
+    let [side, place, depth] = [needed(SIDE)?, needed(PLACE)?, needed(DEPTH)?];
+    let gray = Column::find(table, GRAY);
+    let has_doses = [DOSE, EXPOSURE].iter().any(|name| Column::find(table, name).is_some());
+    let dose = has_doses.then(|| DoseColumn::find(table, light)).transpose()?;
+    measured(table, |row| {
+        let gray = gray.map_or(Ok(GrayLevel::WHITE), |gray| {
+            let level = gray.number(row)?;
+            let wanted = "a gray level above 0 (black) up to 1 (white)";
+            let level = GrayLevel::new(level).filter(|level| level.get() > 0.0);
+            level.ok_or_else(|| gray.impossible(row, wanted))
+        })?;
+        let um = side.number(row)?;
+        if !LENGTHS.contains(&um) {
+            return Err(side.impossible(row, "a side from 0.001 um to 1 m"));
+        }
+        let at = place.number(row)?;
+        if at.abs() > *LENGTHS.end() {
+            return Err(place.impossible(row, "a place within 1 m of the middle"));
+        }
+        let dose = dose.as_ref().map(|dose| dose.of(row)).transpose()?;
+        let [side, place] = [um, at].map(Length::from_um);
+        Ok(match depth.length_or_blank(row)? {
+            None => RowContent::Blank,
+            Some(depth) if depth.um() <= 0.0 => RowContent::Nothing,
+            Some(depth) => RowContent::Point(ProfilePoint { gray, side, place, depth, dose }),
+        })
+    })
+}
+
 fn direction_of(column: Column, row: &TableRow) -> Result<ScanDirection, DataError> {
     column.text(row).parse().map_err(|_| column.impossible(row, "`across` or `along`"))
 }
@@ -623,6 +682,29 @@ mod tests {
             assert!(said.contains(words), "{said}");
         }
         assert_eq!(lines("kind\nline\n"), Err(DataError::NoColumn(DIRECTION)));
+    }
+
+    #[test]
+    fn profiles_have_places_and_perhaps_doses() {
+        let profiles = |text: &str| profile_points(&CsvTable::parse(text).unwrap(), None);
+        let head = "gray,side_um,x_um,depth_um\n";
+        let read = profiles(&format!("{head}0.5,300,-20,55\n1,300,400,0\n1,300,40,\n")).unwrap();
+        assert_eq!((read.points.len(), read.none, read.blank), (1, 1, 1));
+        let point = read.points[0];
+        assert_eq!((point.gray.get(), point.place.um(), point.dose), (0.5, -20.0, None));
+        let dosed = profiles("side_um,x_um,depth_um,dose_mj_per_cm2\n300,0,55,90\n").unwrap();
+        assert_eq!(dosed.points[0].dose, Some(Dose::from_mj_per_cm2(90.0)));
+        assert_eq!(dosed.points[0].gray, GrayLevel::WHITE);
+        for (row, words) in [
+            ("0,300,0,55", "column gray: 0 is not a gray level above 0 (black)"),
+            ("1,0,0,55", "column side_um: 0 is not a side"),
+            ("1,300,2e6,55", "column x_um: 2e6 is not a place within 1 m"),
+            ("1,300,x,55", "column x_um: `x` is not a number"),
+        ] {
+            let said = profiles(&format!("{head}{row}\n")).unwrap_err().to_string();
+            assert!(said.contains(words), "{said}");
+        }
+        assert_eq!(profiles("side_um,x_um\n1,1\n"), Err(DataError::NoColumn(DEPTH)));
     }
 
     #[test]

@@ -24,6 +24,7 @@ mod fit_curve;
 mod fit_gray;
 mod fit_lamp;
 mod fit_law;
+mod fit_profiles;
 mod fit_scan;
 mod fit_two_depth;
 mod fit_widths;
@@ -53,12 +54,13 @@ pub use fit_curve::{CurveFit, fit_curve};
 pub use fit_gray::{GrayFit, LevelFit, LineEstimate, fit_gray};
 pub use fit_lamp::{LampFit, fit_lamp};
 pub use fit_law::{LawCurve, LawFit, LawLine, fit_law, law_numbers};
+pub use fit_profiles::{ProfileFit, fit_profiles};
 pub use fit_scan::{LineKind, LinesOf, ScanDirection, ScanFit, fit_scan};
 pub use fit_two_depth::{TwoDepthFit, fit_two_depth};
 pub use fit_widths::{ManyLayersFit, WidthFit, fit_many_layers, fit_widths};
 pub use measurements::{
-    DataError, DepthPoint, LampPoint, LawPoint, LawTable, LinePoint, Measured, WidthPoint,
-    depth_points, lamp_points, law_points, line_points, width_points,
+    DataError, DepthPoint, LampPoint, LawPoint, LawTable, LinePoint, Measured, ProfilePoint,
+    WidthPoint, depth_points, lamp_points, law_points, line_points, profile_points, width_points,
 };
 
 /// The cure models that can be fitted to depths.
@@ -308,6 +310,52 @@ pub enum FitError {
         /// The upper end.
         high: f64,
         /// Its unit.
+        unit: &'static str,
+    },
+    /// There are too few points of profiles.
+    #[error(
+        "{} too few: {needed} are the least, from the middle of squares to beyond their edges",
+        are(*points, "point")
+    )]
+    TooFewProfilePoints {
+        /// The number there is.
+        points: usize,
+        /// The least number.
+        needed: usize,
+    },
+    /// No square is white, so the light of gray levels has no measure.
+    #[error("no square is white: measure one of gray level 1 too")]
+    NoWhiteProfile,
+    /// Some points of profiles have doses, and others none.
+    #[error("{with} of {all} points have a dose: give all of them one, or none")]
+    SomeDoses {
+        /// The number of points with a dose.
+        with: usize,
+        /// The number of points.
+        all: usize,
+    },
+    /// No spread of light fits the profiles.
+    #[error(
+        "no light that spreads as a Gaussian and fades with depth has such profiles: check the columns, \
+         and that x_um is measured from the middle of the square"
+    )]
+    NoProfileFit,
+    /// The interval of a number is too wide.
+    #[error(
+        "the profiles do not determine {what}: it may be {} to {}{}{unit}; measure points from the middle \
+         of each square to beyond its edges",
+        short(*low),
+        short(*high),
+        if unit.is_empty() { "" } else { " " }
+    )]
+    VagueProfiles {
+        /// The number's name.
+        what: &'static str,
+        /// The lower end of its 95% confidence interval.
+        low: f64,
+        /// The upper end.
+        high: f64,
+        /// Its unit, or nothing.
         unit: &'static str,
     },
     /// The points of one group cannot be fitted.

@@ -21,7 +21,7 @@ pub(super) struct EstimateTable {
 struct CalibrateAnswer {
     /// Name of the measurements, as given.
     input: String,
-    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp`, `scan` or `composition`.
+    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp`, `scan`, `spread` or `composition`.
     model: &'static str,
     /// Rows that were used.
     points: usize,
@@ -30,8 +30,8 @@ struct CalibrateAnswer {
     without_measure: usize,
     /// Rows without a measurement.
     blank: usize,
-    /// Share of the scatter that the model explains, of all points; null with models of single sizes,
-    /// and with laws, whose parameters have it for depths and widths.
+    /// Share of the scatter that the model explains, of all points; null with models of single sizes
+    /// and profiles, and with laws, whose parameters have it for depths and widths.
     r2: Option<f64>,
     /// The parameters of the model.
     parameters: Vec<Parameter>,
@@ -131,6 +131,12 @@ impl EstimateTable {
         let [value, low, high] = in_words(number);
         self.line(&format!("{name} ({unit})"), &[&value, &low, &high]);
         self.answer.parameters.push(Parameter::of(name, unit, number));
+    }
+
+    /// Adds a number of a unit without an interval.
+    pub(super) fn number(&mut self, name: &str, unit: &'static str, value: f64) {
+        self.line(&format!("{name} ({unit})"), &[&short(value)]);
+        self.answer.parameters.push(Parameter::of(name, unit, [value, f64::NAN, f64::NAN]));
     }
 
     /// Adds how much of the scatter of some points the model explains.

@@ -5,6 +5,7 @@ mod depth;
 mod estimate_table;
 mod lamp;
 mod scan;
+mod spread;
 mod width;
 
 use std::io::{self, IsTerminal};
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
 use lamp_grayscale::calibrate::CsvTable;
-use lamp_grayscale::material::{Given, Material, MaterialError};
+use lamp_grayscale::material::{Given, Material, MaterialError, SpreadNumbers};
 use lamp_grayscale::resin::Intensity;
 use lamp_pipeline::documents::document;
 use lamp_stack::CatalogueError;
@@ -28,7 +29,7 @@ use crate::terminal::progress::Progress;
 use estimate_table::EstimateTable;
 use lamp_plots::{self as plots, Plot, drawn};
 
-/// Fit a resin's parameters to measured cure depths, widths or lines
+/// Fit a resin's parameters to measured cure depths, widths, lines or profiles
 ///
 /// It prints each parameter with its 95% confidence interval, writes the parameters to a material
 /// file, and plots the fit with the measured points.
@@ -48,6 +49,7 @@ enum Calibration {
     Width(width::WidthArgs),
     Lamp(lamp::LampArgs),
     Scan(scan::ScanArgs),
+    Spread(spread::SpreadArgs),
     Composition(composition::CompositionArgs),
 }
 
@@ -57,6 +59,7 @@ pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
         Calibration::Width(args) => width::run(args, common),
         Calibration::Lamp(args) => lamp::run(args, common),
         Calibration::Scan(args) => scan::run(args, common),
+        Calibration::Spread(args) => spread::run(args, common),
         Calibration::Composition(args) => composition::run(args, common),
     }
 }
@@ -164,6 +167,25 @@ impl CalibrationFiles {
     /// Returns the source line of a parameter fitted to `points` points.
     fn source(&self, points: usize) -> String {
         format!("calibrated from {}, {points} points", self.source_name())
+    }
+
+    /// Returns how a material of this base gets a spread of light. Its intensity stays the light of a wide
+    /// field.
+    fn spread_setter(
+        &self,
+        base: Option<&Material>,
+        spread: SpreadNumbers,
+    ) -> Result<impl FnOnce(&mut Material) + use<>, Exit> {
+        let field = base.map(Material::light).transpose().map_err(anyhow::Error::new)?.flatten();
+        Ok(move |material: &mut Material| {
+            if material.spread.as_ref().is_some_and(|spread| spread.pixel.is_some())
+                && let (Some(value), Some(given)) = (field, &material.intensity)
+            {
+                let source = format!("{}, as of a wide field", given.source);
+                material.intensity = Some(Given { value, plus_minus: None, source });
+            }
+            material.spread = Some(spread);
+        })
     }
 
     /// Writes what was asked for, and prints the table or its answer. Nothing is written unless

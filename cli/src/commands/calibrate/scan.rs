@@ -4,7 +4,6 @@ use clap::Args;
 use lamp_grayscale::calibrate::{
     LineKind, LinePoint, ScanDirection, ScanFit, fit_scan, line_points,
 };
-use lamp_grayscale::material::{Given, Material};
 use lamp_stack::{Dpi, Length};
 
 use super::CalibrationFiles;
@@ -50,19 +49,9 @@ pub(super) fn run(args: &ScanArgs, common: &Common) -> Result<(), Exit> {
     fitted.estimate("sigma along", &fit.along);
     fitted.estimate("Ec of lines", &fit.critical_dose);
     let plot = plot(format!("Lines: {}", files.source_name()), &fit, &measured.points);
-    // The light of a wide field, which the doses were of, stays when the spread changes.
-    let field =
-        base.as_ref().map(Material::light).transpose().map_err(anyhow::Error::new)?.flatten();
-    let add = |material: &mut Material| {
-        if material.spread.as_ref().is_some_and(|spread| spread.pixel.is_some())
-            && let (Some(value), Some(given)) = (field, &material.intensity)
-        {
-            let source = format!("{}, as of a wide field", given.source);
-            material.intensity = Some(Given { value, plus_minus: None, source });
-        }
-        material.spread = Some(fit.numbers(&files.source(fit.points)));
-    };
-    files.finish(base, add, &[plot], &fitted, common)
+    let spread = fit.numbers(&files.source(fit.points));
+    let set_spread = files.spread_setter(base.as_ref(), spread)?;
+    files.finish(base, set_spread, &[plot], &fitted, common)
 }
 
 /// Growth of lines and gaps over their width.
@@ -119,7 +108,10 @@ fn series(
     });
     let (kind, dose) = (first.kind, first.dose.mj_per_cm2());
     Series {
-        name: format!("{kind}s {direction}, {dose} mJ/cm²: {}", in_legend("σ", "µm", estimate)),
+        name: format!(
+            "{kind}s {direction}, {dose} mJ/cm²: {}",
+            in_legend("spread", "µm", estimate)
+        ),
         points: lines.iter().map(|it| (it.drawn.um(), it.cured.um() - it.drawn.um())).collect(),
         curve: curve.collect(),
         band: Vec::new(),

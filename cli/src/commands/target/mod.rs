@@ -1,5 +1,6 @@
 //! `lamp target`: the kinds of test images.
 
+mod grays;
 mod scan;
 mod screens;
 mod squares;
@@ -23,7 +24,8 @@ use squares::Doses;
 Examples:
   lamp target squares --doses 60..600mJ/cm2 --material lamp-suspension -o targets/
   lamp target scan --doses 150,300mJ/cm2 --material lamp-suspension -o lines/
-  lamp target screens -o screens.tif")]
+  lamp target screens -o screens.tif
+  lamp target grays -o grays.tif")]
 pub(crate) struct TargetArgs {
     #[command(subcommand)]
     what: Target,
@@ -34,6 +36,7 @@ enum Target {
     Squares(squares::SquaresArgs),
     Scan(scan::ScanArgs),
     Screens(screens::ScreensArgs),
+    Grays(grays::GraysArgs),
 }
 
 pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
@@ -41,6 +44,7 @@ pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
         Target::Squares(args) => squares::run(args, common),
         Target::Scan(args) => scan::run(args, common),
         Target::Screens(args) => screens::run(args, common),
+        Target::Grays(args) => grays::run(args, common),
     }
 }
 

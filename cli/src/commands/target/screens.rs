@@ -81,7 +81,7 @@ impl ScreensArgs {
 }
 
 /// Parses a gray level in per cent.
-fn parse_level(text: &str) -> Result<GrayLevel, String> {
+pub(super) fn parse_level(text: &str) -> Result<GrayLevel, String> {
     let percent =
         text.trim().strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
     percent
