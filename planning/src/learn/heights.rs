@@ -41,9 +41,21 @@ pub fn face_at(part: &TimedPart, pixel: [u32; 2], z: Length) -> Result<usize, Fa
 /// place and the layer above it. Layers are counted from the light. Without cured
 /// resin above the face there is no height.
 pub fn height_of(part: &TimedPart, doses: &[f64], light: &Light, face: usize) -> Option<Length> {
-    let down = doses[face..].iter().take_while(|&&dose| dose >= 1.0).count();
+    height_with(part, doses, 1.0, light, face)
+}
+
+/// Returns the same where all doses are larger by a factor.
+pub(super) fn height_with(
+    part: &TimedPart,
+    doses: &[f64],
+    factor: f64,
+    light: &Light,
+    face: usize,
+) -> Option<Length> {
+    let is_cured = |&dose: &f64| factor * dose >= 1.0;
+    let down = doses[face..].iter().take_while(|dose| is_cured(dose)).count();
     let last = match down {
-        0 => doses[..face].iter().rposition(|&dose| dose >= 1.0)?,
+        0 => doses[..face].iter().rposition(is_cured)?,
         cured => face + cured - 1,
     };
     let of_last = &part.layers()[last];
@@ -53,7 +65,7 @@ pub fn height_of(part: &TimedPart, doses: &[f64], light: &Light, face: usize) ->
         SampleHeight::Bottom => 0.0,
     };
     let sampled_um = of_last.z.um() + above * of_last.thickness.um();
-    let height_um = sampled_um - light.penetration_depth.um() * doses[last].ln();
+    let height_um = sampled_um - light.penetration_depth.um() * (factor * doses[last]).ln();
     Some(Length::from_um(height_um))
 }
 

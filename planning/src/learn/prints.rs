@@ -5,10 +5,12 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::{Catalogued, Length};
 
+use super::state::{Model, ProbableStates};
+use super::step::next_times;
 use super::*;
-use crate::light::Light;
+use crate::light::{Light, SampleHeight};
 use crate::speed::testing::{part, pegda};
-use crate::speed::{Platform, Simulation, SpeedOptions, Tally, plan};
+use crate::speed::{PartPages, Platform, Simulation, SpeedOptions, Tally, TimedPart, plan};
 
 const LAYERS: usize = 50;
 /// Bounds that only the shortest time of 004 limits.
@@ -296,36 +298,198 @@ fn heights_teach_the_state() {
     assert!(worst(&off[2]) < 60.0 && worst(&off[3]) < 60.0, "{off:?} {best:?}");
 }
 
-/// Plants whose penetration depth is up to 30 % off, light and critical dose up to 20 %, spread -30
-/// to +50 %, with a drift of 2 % a print.
-#[test]
-#[ignore = "it prints a table, and takes hours"]
-fn hundreds_of_plants_are_learned_in_three_prints() {
-    let (square, light) = (square_prism(0), pegda(100.0));
-    let starts = [prism_times(4.0, &light, false).to_vec(), planned(&square, light)];
-    let plants: usize = std::env::var("LAMP_PLANTS").map_or(200, |count| count.parse().unwrap());
-    let mut random = SplitMix(1);
+/// A plant whose penetration depth is up to 30 % off, light and critical dose up to 20 %, spread -30
+/// to +50 %, with a drift to either side.
+fn plant_of(seed: u64, drift: f64) -> Plant {
+    let mut random = SplitMix(seed);
     let mut uniform = |low: f64, high: f64| {
         low + (high - low) * (random.next() >> 11) as f64 / (1_u64 << 53) as f64
     };
-    for number in 0..plants {
-        let real = Plant {
-            depth: uniform(0.7, 1.3),
-            dose: uniform(0.8, 1.2) / uniform(0.8, 1.2),
-            spread: uniform(0.7, 1.5),
-            drift: if uniform(0.0, 1.0) < 0.5 { 0.02 } else { -0.02 },
-        };
-        for (name, start) in ["4 E_c", "plan speed"].iter().zip(&starts) {
-            let mut deviates = noise(number as u64);
-            let prints = learned_prints(&square, light, real, start, 4, |job, _, _, print| {
-                counted(job, print, &mut deviates)
-            });
-            let wrong: Vec<_> = prints.iter().map(|print| print.wrong().sum()).collect();
-            let known = real.light(&light, 3);
-            let of_square = part(&square);
-            let simulation = Simulation::new(&of_square, &known, 1 << 30).unwrap();
-            let [best] = simulation.tally([&planned(&square, known)]);
-            println!("{number},{name},{real:?},{wrong:?},{}", best.wrong().sum());
+    Plant {
+        depth: uniform(0.7, 1.3),
+        dose: uniform(0.8, 1.2) / uniform(0.8, 1.2),
+        spread: uniform(0.7, 1.5),
+        drift: if uniform(0.0, 1.0) < 0.5 { drift } else { -drift },
+    }
+}
+
+/// The course of a plant from one start.
+#[derive(Debug)]
+struct Course {
+    /// The wrong pixels of each print.
+    wrong: Vec<u64>,
+    /// The wrong pixels of each print after the first, planned for the light of the print before it.
+    known: Vec<u64>,
+    /// Whether the 95 % interval of each number has the truth, after each print.
+    covered: Vec<[bool; 3]>,
+}
+
+const PRINTS: usize = 4;
+
+/// Prints a plant and learns from it. Another learner knows each print's light exactly, but not the
+/// drift to the next.
+fn course_of(part: &TimedPart, model: Light, real: Plant, start: &[f64], seed: u64) -> Course {
+    let material = Material::builtin("pegda-sudan").unwrap();
+    let mut job = Job::of_part(part.clone(), model, material, &PLATFORM, start.to_vec());
+    let mut deviates = noise(seed);
+    let mut course = Course { wrong: Vec::new(), known: Vec::new(), covered: Vec::new() };
+    let mut known_times: Option<Vec<f64>> = None;
+    for number in 0..PRINTS {
+        let light = real.light(&model, number);
+        let simulation = Simulation::new(part, &light, 1 << 30).unwrap();
+        let [print] = simulation.tally([&job.prints[number].times]);
+        course.wrong.push(print.wrong().sum());
+        if let Some(times) = &known_times {
+            let [print] = simulation.tally([times]);
+            course.known.push(print.wrong().sum());
         }
+        if number + 1 == PRINTS {
+            break;
+        }
+        let dose = real.dose * (1.0 + real.drift).powi(number as i32);
+        let truth = [real.depth, dose, real.spread];
+        let mut exact = Model::new(part, &model, 1 << 30);
+        let states = ProbableStates::known(truth);
+        known_times = Some(next_times(&job, &mut exact, &states, start).unwrap().times);
+        let measured = counted(&job, &print, &mut deviates);
+        let learned = learn(&job, number, &measured, Method::State, 1 << 30).unwrap();
+        let Lesson::State(lesson) = learned.lesson else { panic!("a state is learned") };
+        let factors = lesson.after.factors();
+        course.covered.push(std::array::from_fn(|k| {
+            let [low, high] = factors[k].interval();
+            (low..=high).contains(&truth[k])
+        }));
+        job.prints[number].measured = Some((measured, String::new()));
+        let (times, state) = (learned.times, Some(lesson.after));
+        job.prints.push(JobPrint { times, measured: None, state });
+    }
+    course
+}
+
+/// The courses of some plants that print a part, each from one time for all layers and from a plan.
+fn courses(voxels: &Voxels, light: Light, plants: usize, drift: f64) -> Vec<Course> {
+    let part = part(voxels);
+    let plan = planned(voxels, light);
+    let single = vec![plan.iter().sum::<f64>() / plan.len() as f64; plan.len()];
+    let mut all = Vec::new();
+    for number in 0..plants {
+        let real = plant_of(number as u64, drift);
+        for start in [&single, &plan] {
+            let course = course_of(&part, light, real, start, number as u64);
+            println!("{number} {real:?} {course:?}");
+            all.push(course);
+        }
+    }
+    all
+}
+
+/// Returns the largest ratio of a print's wrong pixels to the best before it.
+fn worst_rise(wrong: &[u64]) -> f64 {
+    let rise = |number: usize| {
+        let best = wrong[..number].iter().min().unwrap();
+        wrong[number] as f64 / *best as f64
+    };
+    (1..wrong.len()).map(rise).fold(0.0, f64::max)
+}
+
+fn quantile(numbers: impl Iterator<Item = f64>, share: f64) -> f64 {
+    let mut numbers: Vec<_> = numbers.collect();
+    numbers.sort_by(f64::total_cmp);
+    numbers[((numbers.len() - 1) as f64 * share).round() as usize]
+}
+
+/// Prints quantiles of rises and of what is left after three prints, and coverage.
+fn summary(courses: &[Course]) {
+    let left = |course: &Course| course.wrong[PRINTS - 1] as f64 / course.wrong[0] as f64;
+    let to_known = |course: &Course| {
+        course.wrong[1..]
+            .iter()
+            .zip(&course.known)
+            .map(|(a, b)| *a as f64 / *b as f64)
+            .collect::<Vec<_>>()
+    };
+    let shares = [0.0, 0.25, 0.5, 0.75, 0.9, 0.95, 1.0];
+    let rises = shares.map(|share| quantile(courses.iter().map(|c| worst_rise(&c.wrong)), share));
+    let known = |course: &Course| {
+        let all: Vec<_> =
+            std::iter::once(course.wrong[0]).chain(course.known.iter().copied()).collect();
+        worst_rise(&all)
+    };
+    println!("rises {rises:.3?}");
+    println!("rises of known light {:.3?}", shares.map(|s| quantile(courses.iter().map(known), s)));
+    println!("left {:.4?}", shares.map(|s| quantile(courses.iter().map(left), s)));
+    for number in 0..PRINTS - 1 {
+        let ratios = || courses.iter().map(|course| to_known(course)[number]);
+        println!(
+            "print {} to known light {:.3?}",
+            number + 1,
+            shares.map(|s| quantile(ratios(), s))
+        );
+        let covered = |k: usize| {
+            let of = courses.iter().filter(|course| course.covered[number][k]).count();
+            of as f64 / courses.len() as f64
+        };
+        println!("covered after print {number} {:.3?}", [0, 1, 2].map(covered));
+    }
+}
+
+fn number_of(name: &str, usual: f64) -> f64 {
+    std::env::var(name).map_or(usual, |number| number.parse().unwrap())
+}
+
+#[test]
+fn plants_that_drift_are_learned_as_well_as_known_light_allows() {
+    let plants = number_of("LAMP_PLANTS", 1.0) as usize;
+    let courses =
+        courses(&cavity_staircase(1), pegda(200.0), plants, number_of("LAMP_DRIFT", 0.02));
+    summary(&courses);
+    for course in &courses {
+        assert!(worst_rise(&course.wrong) <= 1.2, "{course:?}");
+        for (learned, known) in course.wrong[1..].iter().zip(&course.known) {
+            assert!(*learned as f64 <= 1.1 * *known as f64, "{course:?}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "it prints a table, and takes an hour"]
+fn hundreds_of_plants_are_learned_in_three_prints() {
+    let (plants, drift) = (number_of("LAMP_PLANTS", 200.0), number_of("LAMP_DRIFT", 0.02));
+    summary(&courses(&square_prism(0), pegda(100.0), plants as usize, drift));
+}
+
+/// Made-up counts, which no state explains, need the most work.
+#[test]
+#[ignore = "it is a measurement: time it"]
+fn a_step_on_a_blade() {
+    let mesh = lamp_fixtures::build(lamp_fixtures::Sample::Blade, 100_000).unwrap();
+    let blade = lamp_slicing::Part::from_facets("blade", mesh.facets);
+    let options = lamp_slicing::SliceOptions {
+        pitch: lamp_stack::Pitch::of_dpi(1500.0).unwrap(),
+        thickness: Length::from_um(100.0),
+        ..lamp_slicing::SliceOptions::default()
+    };
+    let mut pages = PartPages::new(128);
+    for layer in lamp_slicing::Slices::new(blade, &options).unwrap() {
+        pages.push(layer.unwrap()).unwrap();
+    }
+    let blade = pages.finish().unwrap();
+    let layers = blade.layers().len();
+    let material = Material::builtin("pegda-sudan").unwrap();
+    let light = Light::of(&material, SampleHeight::Top).unwrap();
+    let job = Job::of_part(blade, light, material, &PLATFORM, vec![0.26; layers]);
+    let mut random = SplitMix(1);
+    for is_made_up in [true, false] {
+        let simulation = Simulation::new(&job.part, &OFF.light(&light, 0), 1 << 28).unwrap();
+        let [print] = simulation.estimate([&job.prints[0].times]);
+        let mut measured = counted(&job, &print, &mut || random.normal());
+        if let (true, PrintMeasurements::Areas(rows)) = (is_made_up, &mut measured) {
+            for row in rows {
+                (row.over, row.under) = (random.below(4000) as f64, random.below(300) as f64);
+            }
+        }
+        let begun = std::time::Instant::now();
+        let learned = learn(&job, 0, &measured, Method::State, 1 << 30).unwrap();
+        println!("{is_made_up} {:?} {:?}", begun.elapsed(), learned.lesson);
     }
 }

@@ -4,7 +4,8 @@
 //! from the material's numbers, as logarithms. The most probable state has the least sum of squares,
 //! of the measurements' residuals and of its own distance from the material, each in standard
 //! deviations (Gauss and Newton, with Levenberg's and Marquardt's damping: Nocedal and Wright 2006,
-//! section 10.3). States are then tried around it, as far as the sum's curvature says.
+//! section 10.3). Pairs of a depth and a spread are then tried around it, as far as the sum's curvature
+//! says, each with all doses: one pass over the part counts its voxels at every dose.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -14,10 +15,10 @@ use lamp_grayscale::resin::{Intensity, Quantity};
 use lamp_stack::Length;
 use serde::{Deserialize, Serialize};
 
-use super::heights::height_of;
+use super::heights::{height_of, height_with};
 use crate::light::{IntensityOf, Light};
 use crate::numeric::{dot, solve_positive};
-use crate::speed::{PartError, Simulation, TimedPart};
+use crate::speed::{DoseGrid, PartError, Simulation, TimedPart};
 
 /// The standard deviations of the numbers of a material that states no interval, as logarithms: how
 /// far resins and lamps usually are from a table.
@@ -36,9 +37,7 @@ const DRIFT: f64 = 0.02;
 const COUNT_NOISE: f64 = 0.03;
 /// The standard deviation, in pixels, of an edge that lies anywhere in its pixel: 1/√12.
 const EDGE_PX: f64 = 0.289;
-/// The range of doses over which a voxel is cured that is cured or not, and the standard deviation of
-/// its edges in pixels: prints are not as sharp as their model.
-const SHARP: f64 = 1e-4;
+/// The same where each voxel of the model is cured or not: prints are not as sharp as their model.
 const SHARP_EDGE_PX: f64 = 0.005;
 /// States are searched within these factors of the material's numbers, as logarithms.
 const MOST: [f64; NUMBERS] = [1.2, 1.5, 1.2];
@@ -187,15 +186,6 @@ pub(crate) enum Measurement {
     Height { layer: usize, pixel: [u32; 2], um: f64, sd_um: f64 },
 }
 
-/// How the model counts voxels at edges.
-#[derive(Clone, Copy, PartialEq)]
-enum Edges {
-    /// A voxel's cured share rises as the edge passes through it, so that counts have slopes.
-    Gradual,
-    /// A voxel is cured or not, as prints are counted.
-    Sharp,
-}
-
 /// The prediction of a model for a number that was measured.
 #[derive(Clone, Copy)]
 struct Predicted {
@@ -211,6 +201,8 @@ pub(crate) struct Model<'a> {
     light: Light,
     memory: u64,
     edges_px: Rc<[f64]>,
+    /// The pixels that each column stood for the last time.
+    sampled: u32,
     /// The last few spreads, with the light of measured pixels.
     known: Vec<Spreading<'a>>,
 }
@@ -227,7 +219,7 @@ const KEPT: usize = 6;
 impl<'a> Model<'a> {
     pub(crate) fn new(part: &'a TimedPart, light: &Light, memory: u64) -> Self {
         let edges_px = part.edges_px().into();
-        Self { part, light: *light, memory, edges_px, known: Vec::new() }
+        Self { part, light: *light, memory, edges_px, sampled: 1, known: Vec::new() }
     }
 
     /// Returns the part under the light of a state.
@@ -238,7 +230,9 @@ impl<'a> Model<'a> {
             Some(at) => self.known.remove(at),
             None => {
                 self.known.truncate(KEPT - 1);
-                let simulation = Simulation::new(self.part, &light, self.memory)?;
+                let (memory, least) = (self.memory, self.sampled);
+                let simulation = Simulation::sampled_by(self.part, &light, memory, least)?;
+                self.sampled = simulation.sampled();
                 Spreading { log_spread: logs[SPREAD], simulation, pixels: HashMap::new() }
             }
         };
@@ -265,12 +259,8 @@ impl<'a> Model<'a> {
         &mut self,
         logs: &[f64],
         print: &MeasuredPrint,
-        edges: Edges,
     ) -> Result<Vec<Predicted>, PartError> {
-        let (half_range, edge_px) = match edges {
-            Edges::Gradual => (self.half_pixel(logs), EDGE_PX),
-            Edges::Sharp => (SHARP, SHARP_EDGE_PX),
-        };
+        let half_range = self.half_pixel(logs);
         let edges_px = Rc::clone(&self.edges_px);
         let light = shifted(&self.light, logs);
         let part = self.part;
@@ -289,13 +279,7 @@ impl<'a> Model<'a> {
                     let of_layer = &wrong[*layer];
                     let modeled = of_layer.counts.iter().zip(&of_layer.slopes);
                     for (counted, (modeled, slope)) in counts.iter().zip(modeled) {
-                        // A sample's columns stand for many pixels each, and are Poisson counts.
-                        let sampling = if sampled > 1.0 { counted * sampled } else { 0.0 };
-                        let variance = (COUNT_NOISE * counted).powi(2)
-                            + (edge_px * edges_px[*layer]).powi(2)
-                            + sampling
-                            + 1.0;
-                        let sd = variance.sqrt();
+                        let sd = variance_of(*counted, EDGE_PX * edges_px[*layer], sampled).sqrt();
                         all.push(Predicted {
                             residual: (counted - modeled) / sd,
                             slope: slope / sd,
@@ -314,17 +298,98 @@ impl<'a> Model<'a> {
                             slope: -light.penetration_depth.um() / sd_um,
                         },
                         // Where nothing is cured, the resin begins at the part's top.
-                        None => {
-                            let top = part.layers()[0];
-                            let top_um = top.z.um() + top.thickness.um();
-                            Predicted { residual: (um - top_um) / sd_um, slope: 0.0 }
-                        }
+                        None => Predicted { residual: (um - top_um(part)) / sd_um, slope: 0.0 },
                     });
                 }
             }
         }
         Ok(all)
     }
+}
+
+/// Returns the variance of a count, given the standard deviation of its edges and the pixels that each
+/// column of the model stands for.
+fn variance_of(counted: f64, edges_sd: f64, sampled: f64) -> f64 {
+    // A sample's columns stand for many pixels each, and are Poisson counts.
+    let sampling = if sampled > 1.0 { counted * sampled } else { 0.0 };
+    (COUNT_NOISE * counted).powi(2) + edges_sd * edges_sd + sampling + 1.0
+}
+
+/// The sums of squares of a print's measurements at all doses of a grid.
+struct SquaresByDose {
+    /// Where each voxel is cured or not.
+    sharp: Vec<f64>,
+    /// Where an edge lies anywhere in its pixel.
+    loose: Vec<f64>,
+}
+
+impl Model<'_> {
+    /// Returns the sums of squares of a print, at a depth and a spread, and at all doses of a grid.
+    fn squares_by_dose(
+        &mut self,
+        [depth, spread]: [f64; 2],
+        print: &MeasuredPrint,
+        grid: &DoseGrid,
+    ) -> Result<SquaresByDose, PartError> {
+        let logs = at_unit_dose([depth, spread]);
+        let (edges_px, part) = (Rc::clone(&self.edges_px), self.part);
+        let light = shifted(&self.light, &logs);
+        let Spreading { simulation, pixels, .. } = self.at(&logs)?;
+        let sampled = f64::from(simulation.sampled());
+        let has_counts = |place: &Measurement| matches!(place, Measurement::Counts { .. });
+        let curves = print
+            .places
+            .iter()
+            .any(has_counts)
+            .then(|| simulation.dose_curves(&print.times, grid, true));
+        let [mut sharp, mut loose] = [(); 2].map(|()| vec![0.0; grid.count()]);
+        for place in &print.places {
+            match place {
+                Measurement::Counts { layer, counts } => {
+                    let Some(curves) = &curves else { continue };
+                    for (counted, modeled) in counts.iter().zip(curves.row(*layer)) {
+                        let weight = |edge_px: f64| {
+                            variance_of(*counted, edge_px * edges_px[*layer], sampled).recip()
+                        };
+                        let (of_sharp, of_loose) = (weight(SHARP_EDGE_PX), weight(EDGE_PX));
+                        for (number, modeled) in modeled.iter().enumerate() {
+                            let square = (counted - *modeled as f64).powi(2);
+                            sharp[number] += of_sharp * square;
+                            loose[number] += of_loose * square;
+                        }
+                    }
+                }
+                Measurement::Height { layer, pixel, um, sd_um } => {
+                    let lights =
+                        pixels.entry(*pixel).or_insert_with(|| simulation.light_at(*pixel));
+                    let doses = simulation.doses_of(lights, &print.times);
+                    let top_um = top_um(part);
+                    for number in 0..grid.count() {
+                        let factor = grid.log(number).exp();
+                        let height = height_with(part, &doses, factor, &light, *layer);
+                        let height_um = height.map_or(top_um, Length::um);
+                        let square = ((um - height_um) / sd_um).powi(2);
+                        sharp[number] += square;
+                        loose[number] += square;
+                    }
+                }
+            }
+        }
+        Ok(SquaresByDose { sharp, loose })
+    }
+}
+
+/// Returns a state's logarithms where the dose is the material's.
+fn at_unit_dose([depth, spread]: [f64; 2]) -> [f64; NUMBERS] {
+    let mut logs = [0.0; NUMBERS];
+    (logs[DEPTH], logs[SPREAD]) = (depth, spread);
+    logs
+}
+
+/// Returns the height of the part's top, where resin begins.
+fn top_um(part: &TimedPart) -> f64 {
+    let top = part.layers()[0];
+    top.z.um() + top.thickness.um()
 }
 
 /// A fit of the three numbers.
@@ -387,9 +452,12 @@ impl Fit<'_, '_> {
         DRIFT * ((self.prints.len() - 1 - print) as f64).sqrt()
     }
 
-    /// Returns states around the one with the least sum of squares, each with its weight (population
-    /// Monte Carlo: Cappé et al. 2004). Counts have steps where the edges of many layers pass the
-    /// middle of pixels: states on both sides of a step see where a print was, and slopes do not.
+    /// Returns states around the one with the least sum of squares, each with its weight: a lattice of
+    /// spreads and depths in the directions of their covariance, with all doses at each point. A
+    /// lattice is laid again around the last one's states until it is as close as they are.
+    ///
+    /// Counts have steps where the edges of many layers pass the middle of pixels: all doses together
+    /// show on which side of a step a print was.
     fn states_around(
         &mut self,
         x: &[f64; NUMBERS],
@@ -405,63 +473,104 @@ impl Fit<'_, '_> {
         // over a pixel or two, gradual counts lead far from the truth.
         let half_pixel = self.model.half_pixel(x);
         (0..NUMBERS).for_each(|k| covariance[k][k] += half_pixel * half_pixel / 3.0);
-        let mut normal = normal_deviates();
+        let places: usize = self.prints.iter().map(|print| print.places.len()).sum();
         let mut round = 1;
         loop {
-            let root = root_of(&covariance);
-            let mut states = Vec::new();
-            for spread in SPREADS {
-                for _ in 0..STATES_OF_SPREAD {
-                    let z = [spread, normal(), normal()];
-                    let logs: [f64; NUMBERS] = std::array::from_fn(|k| {
-                        (mean[k] + WIDER * dot(&root[k], &z)).clamp(-MOST[k], MOST[k])
-                    });
-                    // The density of the proposal is divided out; spreads are proposed evenly.
-                    let proposed = dot(&z[1..], &z[1..]);
-                    let other = 0.5 * (proposed - self.prior_squares(&logs));
-                    states.push(Tried { logs, half_squares: 0.5 * self.squares(&logs)?, other });
-                }
-            }
-            let (weights, share) = weights_of(&states);
-            let sum = |of: &dyn Fn(&[f64; NUMBERS]) -> f64| {
-                let weighted = weights.iter().zip(&states);
-                weighted.map(|(weight, state)| weight * of(&state.logs)).sum::<f64>()
+            let half_width =
+                (WIDTH_SDS * covariance[DOSE][DOSE].sqrt()).clamp(LEAST_WIDTH, MOST[DOSE]);
+            let step = half_width / DOSES as f64;
+            let grid = DoseGrid { middle: mean[DOSE], step, half: DOSES };
+            let tried = self.lattice(&mean, &covariance, &grid)?;
+            let least = |of: fn(&SquaresByDose) -> &[f64]| {
+                let of_tried = |tried: &Tried| {
+                    let of_print = |print| of(print).iter().copied().fold(f64::INFINITY, f64::min);
+                    tried.prints.iter().map(of_print).sum::<f64>()
+                };
+                tried.iter().map(of_tried).fold(f64::INFINITY, f64::min) / places as f64
             };
-            mean = std::array::from_fn(|k| sum(&|logs| logs[k]));
-            covariance = std::array::from_fn(|a| {
-                std::array::from_fn(|b| sum(&|logs| (logs[a] - mean[a]) * (logs[b] - mean[b])))
-            });
-            if share == 1.0 || round == MOST_ROUNDS {
-                let misfit = self.misfit(&mean)?;
+            // Measurements that no state explains are less exact than they should be (Birge 1932).
+            let birge = least(|print| &print.sharp).max(1.0);
+            let members: Vec<_> = tried
+                .iter()
+                .map(|tried| {
+                    let (log_sum, doses) = self.doses_of(tried, birge, &grid);
+                    (log_sum - 0.5 * self.pair_prior_squares(tried.pair), doses)
+                })
+                .collect();
+            let (weights, share) =
+                weights_of(&members.iter().map(|member| member.0).collect::<Vec<_>>());
+            let members: Vec<_> = tried
+                .iter()
+                .zip(weights)
+                .zip(members)
+                .map(|((tried, weight), (_, doses))| Member { pair: tried.pair, weight, doses })
+                .collect();
+            (mean, covariance) = moments_of(&members, &grid);
+            let count = 1.0 / members.iter().map(|member| member.weight.powi(2)).sum::<f64>();
+            if share == 1.0 && count >= ENOUGH || round == MOST_ROUNDS {
+                let misfit = least(|print| &print.loose).sqrt();
                 let mean = LightState::new(&mean, covariance);
-                let members = states.iter().map(|state| state.logs).zip(weights).collect();
-                return Ok(ProbableStates { mean, misfit, members });
+                return Ok(ProbableStates { mean, misfit, grid, members });
             }
             round += 1;
         }
     }
 
-    /// Returns the sum of squares of the measurements, where a voxel is cured or not.
-    fn squares(&mut self, logs: &[f64; NUMBERS]) -> Result<f64, PartError> {
-        let mut squares = 0.0;
-        for (number, print) in self.prints.iter().enumerate() {
-            // Of earlier prints, nobody knows on which side of a step the drift left them.
-            let is_last = number + 1 == self.prints.len();
-            let edges = if is_last { Edges::Sharp } else { Edges::Gradual };
-            squares += squares_of(&self.model.predict(logs, print, edges)?, self.drift(number));
+    /// Returns a lattice of spreads and depths, with the sums of squares at all doses.
+    fn lattice(
+        &mut self,
+        mean: &[f64; NUMBERS],
+        covariance: &[[f64; NUMBERS]; NUMBERS],
+        grid: &DoseGrid,
+    ) -> Result<Vec<Tried>, PartError> {
+        // The root's first column alone changes the spread: light of columns is computed for each.
+        let spread_sd = (covariance[SPREAD][SPREAD] + LEAST_VARIANCE).sqrt();
+        let along = covariance[DEPTH][SPREAD] / spread_sd;
+        let across = (covariance[DEPTH][DEPTH] - along * along).max(0.0) + LEAST_VARIANCE;
+        let mut all = Vec::new();
+        for spread in SPREADS {
+            for depth in DEPTHS {
+                let depth = mean[DEPTH] + along * spread + across.sqrt() * depth;
+                let spread = mean[SPREAD] + spread_sd * spread;
+                let pair = [
+                    depth.clamp(-MOST[DEPTH], MOST[DEPTH]),
+                    spread.clamp(-MOST[SPREAD], MOST[SPREAD]),
+                ];
+                let squares = |print| self.model.squares_by_dose(pair, print, grid);
+                let prints = self.prints.iter().map(squares).collect::<Result<_, PartError>>()?;
+                all.push(Tried { pair, prints });
+            }
         }
-        Ok(squares)
+        Ok(all)
     }
 
-    /// Returns the root mean square of the residuals at a state.
-    fn misfit(&mut self, logs: &[f64; NUMBERS]) -> Result<f64, PartError> {
-        let (mut squares, mut count) = (0.0, 0);
-        for (number, print) in self.prints.iter().enumerate() {
-            let predicted = self.model.predict(logs, print, Edges::Gradual)?;
-            squares += squares_of(&predicted, self.drift(number));
-            count += predicted.len();
+    /// Returns the logarithm of how probable a depth and a spread make the measurements, and the
+    /// probabilities of the doses of the last print (a filter of a random walk: Särkkä 2013, section
+    /// 4.1).
+    fn doses_of(&self, tried: &Tried, birge: f64, grid: &DoseGrid) -> (f64, Vec<f64>) {
+        let prior = |number| 0.5 * (grid.log(number) / self.prior_sds[DOSE]).powi(2);
+        let mut logs: Vec<_> = (0..grid.count()).map(|number| -prior(number)).collect();
+        let (mut log_sum, mut doses) = (0.0, Vec::new());
+        for (number, print) in tried.prints.iter().enumerate() {
+            if number > 0 {
+                let drifted = drifted(&doses, grid.step, 0);
+                logs = drifted.into_iter().map(|dose| dose.max(f64::MIN_POSITIVE).ln()).collect();
+            }
+            logs.iter_mut()
+                .zip(&print.sharp)
+                .for_each(|(log, squares)| *log -= 0.5 * squares / birge);
+            let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            doses = logs.iter().map(|log| (log - most).exp()).collect();
+            let sum: f64 = doses.iter().sum();
+            doses.iter_mut().for_each(|dose| *dose /= sum);
+            log_sum += most + sum.ln();
         }
-        Ok((squares / count as f64).sqrt())
+        (log_sum, doses)
+    }
+
+    /// Returns the sum of squares of a depth and a spread themselves.
+    fn pair_prior_squares(&self, pair: [f64; 2]) -> f64 {
+        self.prior_squares(&at_unit_dose(pair))
     }
 
     /// Returns the sum of squares of the numbers themselves.
@@ -497,7 +606,7 @@ impl Fit<'_, '_> {
         (0..NUMBERS).for_each(|k| sum.curvature[k * NUMBERS + k] = self.prior_sds[k].powi(-2));
         for (number, print) in self.prints.iter().enumerate() {
             let drift = self.drift(number);
-            let here = self.model.predict(logs, print, Edges::Gradual)?;
+            let here = self.model.predict(logs, print)?;
             sum.value += 0.5 * squares_of(&here, drift);
             if !with_slopes {
                 continue;
@@ -505,7 +614,7 @@ impl Fit<'_, '_> {
             let mut moved = |number: usize, by: f64| {
                 let mut moved = *logs;
                 moved[number] += by;
-                let there = self.model.predict(&moved, print, Edges::Gradual)?;
+                let there = self.model.predict(&moved, print)?;
                 let slope =
                     |(there, here): (&Predicted, &Predicted)| (here.residual - there.residual) / by;
                 Ok::<Vec<f64>, PartError>(there.iter().zip(&here).map(slope).collect())
@@ -545,46 +654,75 @@ fn squares_of(predicted: &[Predicted], drift: f64) -> f64 {
     squares - drift * drift * with_slopes * with_slopes / (1.0 + drift * drift * slopes)
 }
 
-/// Returns a root of a covariance, whose first column alone changes the spread: light of columns is
-/// computed for each spread.
-fn root_of(covariance: &[[f64; NUMBERS]; NUMBERS]) -> [[f64; NUMBERS]; NUMBERS] {
-    let order = [SPREAD, DEPTH, DOSE];
-    let mut factor: Vec<_> =
-        order.iter().flat_map(|&row| order.map(|column| covariance[row][column])).collect();
-    (0..NUMBERS).for_each(|k| factor[k * NUMBERS + k] += LEAST_VARIANCE);
-    // The solver leaves the Cholesky factor in its matrix.
-    solve_positive(&mut factor, vec![0.0; NUMBERS]);
-    let mut root = [[0.0; NUMBERS]; NUMBERS];
-    for (row, number) in order.into_iter().enumerate() {
-        root[number][..=row].copy_from_slice(&factor[row * NUMBERS..=row * NUMBERS + row]);
+/// Returns the probabilities of doses after the drift to the next print, `more` steps beyond both ends.
+fn drifted(doses: &[f64], step: f64, more: usize) -> Vec<f64> {
+    let reach = drift_steps(step) as isize;
+    let weight = |away: isize| (-0.5 * (away as f64 * step / DRIFT).powi(2)).exp();
+    let weights: Vec<_> = (-reach..=reach).map(weight).collect();
+    let sum: f64 = weights.iter().sum();
+    let mut after = vec![0.0; doses.len() + 2 * more];
+    for (from, dose) in doses.iter().enumerate().filter(|(_, dose)| **dose > 0.0) {
+        let first = from as isize + more as isize - reach;
+        for (away, weight) in weights.iter().enumerate() {
+            let to = usize::try_from(first + away as isize).ok().and_then(|to| after.get_mut(to));
+            if let Some(to) = to {
+                *to += dose * weight / sum;
+            }
+        }
     }
-    root
+    after
 }
 
-/// A state that was tried.
+/// Returns the steps that a drift reaches.
+fn drift_steps(step: f64) -> usize {
+    (3.5 * DRIFT / step).ceil() as usize
+}
+
+/// A depth and a spread that were tried, with the sums of squares of each print.
 struct Tried {
-    logs: [f64; NUMBERS],
-    /// Half the sum of squares of the measurements.
-    half_squares: f64,
-    /// The logarithm of its weight without measurements.
-    other: f64,
+    pair: [f64; 2],
+    prints: Vec<SquaresByDose>,
 }
 
-/// Returns the weights of states, whose sum is 1, and the share of them that is taken, as logarithms.
+/// Returns the mean and the covariance of states.
+fn moments_of(members: &[Member], grid: &DoseGrid) -> ([f64; NUMBERS], [[f64; NUMBERS]; NUMBERS]) {
+    let own = |member: &Member| {
+        let logs = || member.doses.iter().enumerate().map(|(at, dose)| (grid.log(at), dose));
+        let mean = logs().map(|(log, dose)| log * dose).sum::<f64>();
+        let variance = logs().map(|(log, dose)| (log - mean).powi(2) * dose).sum::<f64>();
+        let mut logs = at_unit_dose(member.pair);
+        logs[DOSE] = mean;
+        // A dose stands for all doses within a step.
+        (member.weight, logs, variance + grid.step * grid.step / 12.0)
+    };
+    let all: Vec<_> = members.iter().map(own).collect();
+    let mean: [f64; NUMBERS] =
+        std::array::from_fn(|k| all.iter().map(|(weight, logs, _)| weight * logs[k]).sum());
+    let covariance = std::array::from_fn(|a| {
+        std::array::from_fn(|b| {
+            let within = |variance: f64| if (a, b) == (DOSE, DOSE) { variance } else { 0.0 };
+            let of = |(weight, logs, variance): &(f64, [f64; NUMBERS], f64)| {
+                weight * ((logs[a] - mean[a]) * (logs[b] - mean[b]) + within(*variance))
+            };
+            all.iter().map(of).sum()
+        })
+    });
+    (mean, covariance)
+}
+
+/// Returns the weights of states, whose sum is 1, and the share of their logarithms that is taken.
 ///
 /// Few states are left of measurements that are more exact than the states are close. Weights are
 /// evened out then, until enough states are left.
-fn weights_of(states: &[Tried]) -> (Vec<f64>, f64) {
+fn weights_of(logs: &[f64]) -> (Vec<f64>, f64) {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let at = |share: f64| {
-        let log = |state: &Tried| share * (state.other - state.half_squares);
-        let most = states.iter().map(log).fold(f64::NEG_INFINITY, f64::max);
-        let weights: Vec<_> = states.iter().map(|state| (log(state) - most).exp()).collect();
+        let weights: Vec<_> = logs.iter().map(|log| (share * (log - most)).exp()).collect();
         let sum: f64 = weights.iter().sum();
         weights.into_iter().map(|weight| weight / sum).collect::<Vec<_>>()
     };
     // The effective number of states (Kong 1992).
-    let is_enough =
-        |weights: &[f64]| dot(weights, weights).recip() >= (states.len() / LEAST_SHARE) as f64;
+    let is_enough = |weights: &[f64]| dot(weights, weights).recip() >= LEAST_COUNT;
     let all = at(1.0);
     if is_enough(&all) {
         return (all, 1.0);
@@ -597,71 +735,124 @@ fn weights_of(states: &[Tried]) -> (Vec<f64>, f64) {
     (at(low), low)
 }
 
-/// The spreads that are tried around the best one, in standard deviations, and the states of each.
-const SPREADS: [f64; 5] = [0.0, -0.8, 0.8, -1.6, 1.6];
-const STATES_OF_SPREAD: usize = 24;
-/// States are tried over this multiple of the standard deviations that are known of them.
-const WIDER: f64 = 1.3;
-/// The most rounds, each around the states that the last one found. Exact measurements need several.
+/// The lattice of states around the mean, in standard deviations.
+const SPREADS: [f64; 5] = [0.0, -1.2, 1.2, -2.4, 2.4];
+const DEPTHS: [f64; 7] = [-2.4, -1.6, -0.8, 0.0, 0.8, 1.6, 2.4];
+/// The doses on each side of the mean.
+const DOSES: usize = 150;
+/// The distance from the mean to the last of them, in standard deviations.
+const WIDTH_SDS: f64 = 6.0;
+/// The least distance, as a logarithm: earlier prints had other doses.
+const LEAST_WIDTH: f64 = 0.1;
+/// The most lattices, each around the states of the last one.
 const MOST_ROUNDS: usize = 8;
 /// The least variance of a direction in which states are tried.
 const LEAST_VARIANCE: f64 = 1e-8;
-/// At least one in this many of the states must count.
-const LEAST_SHARE: usize = 6;
+/// Weights are evened out until this many states of a lattice count. If as many count as `ENOUGH`
+/// without that, the lattice is close enough: of states as far apart as its covariance says, 13 do.
+const LEAST_COUNT: f64 = 4.0;
+const ENOUGH: f64 = 7.0;
 
 /// States that the measurements allow.
 pub(crate) struct ProbableStates {
     /// Their mean and covariance.
     pub(crate) mean: LightState,
-    /// The root mean square of the measurements' distances from the mean's, in standard deviations.
+    /// The root mean square of the measurements' distances from the best state's, in standard
+    /// deviations.
     pub(crate) misfit: f64,
-    /// Each with its weight; the weights sum to 1.
-    members: Vec<([f64; NUMBERS], f64)>,
+    /// The doses of the members.
+    grid: DoseGrid,
+    members: Vec<Member>,
+}
+
+/// A depth and a spread with all doses.
+struct Member {
+    pair: [f64; 2],
+    /// The weights of members sum to 1.
+    weight: f64,
+    /// How probable each dose of the last print is.
+    doses: Vec<f64>,
+}
+
+/// The wrong voxels of the next print at some times.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Forecast {
+    /// The mean over all states, and the ends of the interval of 95 % of them.
+    pub(crate) wrong: [f64; 3],
+    /// The factor of all times that leaves the fewest on average, and how many.
+    pub(crate) scale: f64,
+    pub(crate) wrong_scaled: f64,
 }
 
 impl ProbableStates {
-    /// Returns the wrong voxels that each of some times would leave in the next print: their mean,
-    /// and the fewest and most of the states that count.
-    pub(crate) fn expected<const N: usize>(
+    /// Returns the states of a light that is known.
+    #[cfg(test)]
+    pub(super) fn known(factors: [f64; NUMBERS]) -> Self {
+        let logs = factors.map(f64::ln);
+        let grid = DoseGrid { middle: logs[DOSE], step: LEAST_WIDTH / DOSES as f64, half: DOSES };
+        let mut doses = vec![0.0; grid.count()];
+        doses[DOSES] = 1.0;
+        let members = vec![Member { pair: [logs[DEPTH], logs[SPREAD]], weight: 1.0, doses }];
+        let mean = LightState::new(&logs, [[0.0; NUMBERS]; NUMBERS]);
+        Self { mean, misfit: 0.0, grid, members }
+    }
+
+    /// Returns the wrong voxels that each of some times would leave in the next print, whose dose
+    /// drifts on.
+    pub(crate) fn forecasts(
         &self,
         model: &mut Model<'_>,
-        times: [&[f64]; N],
-    ) -> Result<[[f64; 3]; N], PartError> {
-        let mut all = [[0.0, f64::INFINITY, 0.0]; N];
+        times: &[Vec<f64>],
+    ) -> Result<Vec<Forecast>, PartError> {
+        let step = self.grid.step;
+        let (drift, scales) = (drift_steps(step), (MOST_SCALE / step).ceil() as usize);
+        let wider = DoseGrid { half: self.grid.half + drift + scales, ..self.grid };
         let least = LEAST_WEIGHT / self.members.len() as f64;
-        let count = self.members.iter().filter(|(_, weight)| *weight > least);
-        let total: f64 = count.clone().map(|member| member.1).sum();
-        for (number, (logs, weight)) in count.enumerate() {
-            let mut logs = *logs;
-            // The dose drifts until the next print, to either side.
-            logs[DOSE] += if number.is_multiple_of(2) { DRIFT } else { -DRIFT };
-            let tallies = model.at(&logs)?.simulation.estimate(times);
-            for (sum, tally) in all.iter_mut().zip(tallies) {
-                let wrong = tally.wrong().sum() as f64;
-                sum[0] += weight / total * wrong;
-                (sum[1], sum[2]) = (sum[1].min(wrong), sum[2].max(wrong));
+        let count = || self.members.iter().filter(|member| member.weight > least);
+        let total: f64 = count().map(|member| member.weight).sum();
+        // Expected voxels by scale, and all voxels with their probabilities, for each of the times.
+        let mut by_scale = vec![vec![0.0; 2 * scales + 1]; times.len()];
+        let mut all = vec![Vec::new(); times.len()];
+        for member in count() {
+            let doses = drifted(&member.doses, step, drift);
+            let simulation = &model.at(&at_unit_dose(member.pair))?.simulation;
+            for ((by_scale, all), times) in by_scale.iter_mut().zip(&mut all).zip(times) {
+                let curves = simulation.dose_curves(times, &wider, false);
+                let [over, under] = curves.row(0);
+                let wrong: Vec<_> = over.iter().zip(under).map(|(a, b)| (a + b) as f64).collect();
+                let probable = doses.iter().enumerate().filter(|(_, dose)| **dose > 1e-9);
+                for (at, dose) in probable {
+                    let weight = dose * member.weight / total;
+                    all.push((wrong[at + scales], weight));
+                    let scaled = &wrong[at..=at + 2 * scales];
+                    by_scale.iter_mut().zip(scaled).for_each(|(sum, wrong)| *sum += weight * wrong);
+                }
             }
         }
-        Ok(all)
+        let forecast = |(by_scale, mut all): (Vec<f64>, Vec<(f64, f64)>)| {
+            all.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let quantile = |share: f64| {
+                let mut sum = 0.0;
+                let found = all.iter().find(|(_, weight)| {
+                    sum += weight;
+                    sum >= share
+                });
+                found.or(all.last()).map_or(0.0, |(wrong, _)| *wrong)
+            };
+            let best = (0..by_scale.len()).min_by(|&a, &b| by_scale[a].total_cmp(&by_scale[b]));
+            let best = best.unwrap_or(scales);
+            Forecast {
+                wrong: [by_scale[scales], quantile(0.025), quantile(0.975)],
+                scale: ((best as f64 - scales as f64) * step).exp(),
+                wrong_scaled: by_scale[best],
+            }
+        };
+        Ok(by_scale.into_iter().zip(all).map(forecast).collect())
     }
 }
 
 /// States of less weight than this share of the mean weight are left out of what is expected.
 const LEAST_WEIGHT: f64 = 0.1;
-
-/// Returns normal deviates, the same in every run (Box and Muller 1958).
-fn normal_deviates() -> impl FnMut() -> f64 {
-    let mut state = 0_u64;
-    let mut uniform = move || {
-        // SplitMix64 (Steele, Lea and Flood 2014).
-        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mix = state;
-        mix = (mix ^ (mix >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mix = (mix ^ (mix >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((mix ^ (mix >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    };
-    move || {
-        let radius = (-2.0 * (1.0 - uniform()).ln()).sqrt();
-        radius * (2.0 * std::f64::consts::PI * uniform()).cos()
-    }
-}
+/// The largest logarithm of the factor of all times that is tried: a plan for one state may lie near a
+/// step of its counts.
+const MOST_SCALE: f64 = 0.06;

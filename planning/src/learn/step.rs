@@ -9,19 +9,18 @@ use super::job::Job;
 use super::law::Law;
 use super::measured::{AreaRow, HeightRow, PrintMeasurements};
 use super::response::Response;
-use super::state::{LightState, MeasuredPrint, Measurement, Model, states_of};
+use super::state::{Forecast, LightState, MeasuredPrint, Measurement, Model};
+use super::state::{ProbableStates, states_of};
 use crate::speed::{Simulation, SpeedOptions, times_of};
 
-/// The gap of a corrected plan, as a share of the unplanned error.
-const GAP: f64 = 0.001;
+/// The gap of a plan, as a share of the unplanned error: as `lamp plan speed` has it, since a state is
+/// not known any better.
+const GAP: f64 = 0.01;
 /// The penetration depths, as shares of the model's, for which the decay of a law's errors is
 /// reported.
 const DEPTHS: [f64; 3] = [1.0, 0.7, 1.3];
 /// The shares of the way to the planned times, as logarithms, that a step may go.
 const SHARES: [f64; 7] = [1.0, 0.75, 0.5, 0.35, 0.2, 0.1, 0.0];
-/// The factors of all times that are tried after that: a plan for one state may lie near a step of
-/// its counts.
-const SCALES: [f64; 4] = [0.96, 0.98, 1.02, 1.04];
 /// The memory that helps: a state is known from thousands of columns as well as from millions.
 const MOST_MEMORY: u64 = 64 << 20;
 /// The measured prints that a state is learned from, the latest ones: light and resin drift.
@@ -80,7 +79,8 @@ pub struct StateLesson {
     /// The share of the way from there to the planned times, as logarithms, that leaves the fewest
     /// wrong voxels at all states that the measurements allow.
     pub share: f64,
-    /// The wrong voxels of the next print that are expected: their mean, fewest and most.
+    /// The wrong voxels of the next print that are expected: their mean, and the ends of the interval of
+    /// 95 % of the states.
     pub expected: [f64; 3],
     /// The indices of the layers that no time of the platform cures, bottom first.
     pub uncurable: Vec<u32>,
@@ -171,25 +171,6 @@ fn from_state(
         .collect::<Result<Vec<_>, LearnError>>()?;
     let mut model = Model::new(&job.part, &job.light, memory);
     let states = states_of(&mut model, &job.material, &prints)?;
-    let after = states.mean.clone();
-    let options = SpeedOptions {
-        light: after.light(&job.light),
-        platform: job.platform(),
-        margin: job.margin(),
-        gap: GAP,
-        memory,
-    };
-    let layers = job.part.layers();
-    let simulation = model.simulation(&after)?;
-    let planned = times_of(simulation, layers, &options)?;
-    let [_, longest] = job.platform().bounds(layers)?;
-    let [all_cured] = simulation.estimate([&longest]);
-    let uncurable = layers
-        .iter()
-        .enumerate()
-        .rev()
-        .filter(|(at, _)| 2 * all_cured.layers[*at].under > all_cured.wanted[*at]);
-    let uncurable = uncurable.map(|(_, layer)| layer.index).collect();
     // A step begins at the best of all prints that were measured in the same way.
     let error = |measured: &PrintMeasurements| measured.error().number();
     let measured_prints = (0..print)
@@ -199,41 +180,71 @@ fn from_state(
     let from = measured_prints
         .min_by(|a, b| error(a.1).total_cmp(&error(b.1)))
         .map_or(print, |best| best.0);
-    let mut steps = Vec::new();
-    for share in SHARES {
-        let between = |(from, to): (&f64, &f64)| from.powf(1.0 - share) * to.powf(share);
-        let times: Vec<_> = job.prints[from].times.iter().zip(&planned).map(between).collect();
-        steps.push(job.platform().nearest(layers, &times)?);
-    }
-    let expected = states.expected(&mut model, slices::<{ SHARES.len() }>(&steps))?;
-    // Of equal steps, the longest is first.
-    let step = least_of(&expected);
-    let (mut times, mut expected) = (steps.swap_remove(step), expected[step]);
-    let mut scaled = Vec::new();
-    for scale in SCALES {
-        let times: Vec<_> = times.iter().map(|time| time * scale).collect();
-        scaled.push(job.platform().nearest(layers, &times)?);
-    }
-    let of_scales = states.expected(&mut model, slices::<{ SCALES.len() }>(&scaled))?;
-    let scale = least_of(&of_scales);
-    if of_scales[scale][0] < expected[0] {
-        (times, expected) = (scaled.swap_remove(scale), of_scales[scale]);
-    }
+    let NextTimes { times, share, expected } =
+        next_times(job, &mut model, &states, &job.prints[from].times)?;
+    let layers = job.part.layers();
+    let [_, longest] = job.platform().bounds(layers)?;
+    let [all_cured] = model.simulation(&states.mean)?.estimate([&longest]);
+    let uncurable = layers
+        .iter()
+        .enumerate()
+        .rev()
+        .filter(|(at, _)| 2 * all_cured.layers[*at].under > all_cured.wanted[*at]);
+    let uncurable = uncurable.map(|(_, layer)| layer.index).collect();
     let before = job.prints[print].state.clone();
     let before = before.unwrap_or_else(|| LightState::of_material(&job.material));
-    let (share, misfit) = (SHARES[step], states.misfit);
+    let ProbableStates { mean: after, misfit, .. } = states;
     let lesson = StateLesson { before, after, misfit, from, share, expected, uncurable };
     Ok(Learned { times, lesson: Lesson::State(Box::new(lesson)) })
 }
 
-fn slices<const N: usize>(all: &[Vec<f64>]) -> [&[f64]; N] {
-    std::array::from_fn(|number| all[number].as_slice())
+/// The times of the next print.
+pub(super) struct NextTimes {
+    pub(super) times: Vec<f64>,
+    /// The share of the way to the planned times, and the wrong voxels, as in [`StateLesson`].
+    share: f64,
+    pub(super) expected: [f64; 3],
 }
 
-/// Returns the number of the times that are expected to leave the fewest wrong voxels.
-fn least_of(expected: &[[f64; 3]]) -> usize {
-    let least = (0..expected.len()).min_by(|&a, &b| expected[a][0].total_cmp(&expected[b][0]));
-    least.expect("there are times to choose from")
+/// Plans times for the mean of some states, and takes the share of the way there, from some times, that
+/// leaves the fewest wrong voxels on average.
+pub(super) fn next_times(
+    job: &Job,
+    model: &mut Model<'_>,
+    states: &ProbableStates,
+    from: &[f64],
+) -> Result<NextTimes, LearnError> {
+    let layers = job.part.layers();
+    let options = SpeedOptions {
+        light: states.mean.light(&job.light),
+        platform: job.platform(),
+        margin: job.margin(),
+        gap: GAP,
+        memory: MOST_MEMORY,
+    };
+    let planned = times_of(model.simulation(&states.mean)?, layers, &options)?;
+    let mut steps = Vec::new();
+    for share in SHARES {
+        let between = |(from, to): (&f64, &f64)| from.powf(1.0 - share) * to.powf(share);
+        let times: Vec<_> = from.iter().zip(&planned).map(between).collect();
+        steps.push(job.platform().nearest(layers, &times)?);
+    }
+    let forecasts = states.forecasts(model, &steps)?;
+    // Of equal steps, the longest is first.
+    let by_scaled =
+        |a: &usize, b: &usize| forecasts[*a].wrong_scaled.total_cmp(&forecasts[*b].wrong_scaled);
+    let step = (0..steps.len()).min_by(by_scaled).unwrap_or(0);
+    let times: Vec<_> = steps[step].iter().map(|time| forecasts[step].scale * time).collect();
+    let times = job.platform().nearest(layers, &times)?;
+    let of_scaled = states.forecasts(model, std::slice::from_ref(&times))?;
+    let mean = |forecast: &Forecast| forecast.wrong[0];
+    // The platform's limits may keep some times from their scale.
+    let better = of_scaled.into_iter().find(|scaled| mean(scaled) < mean(&forecasts[step]));
+    let (times, forecast) = match better {
+        Some(forecast) => (times, forecast),
+        None => (steps.swap_remove(step), forecasts[step]),
+    };
+    Ok(NextTimes { times, share: SHARES[step], expected: forecast.wrong })
 }
 
 /// Returns the measured numbers with their layers.

@@ -101,6 +101,18 @@ impl ColumnSet {
         }
     }
 
+    /// Returns the columns with their layers repeated: one for each number, which is a layer of this set.
+    pub(crate) fn repeated(&self, layer_of: &[usize]) -> Self {
+        let mut all = Self::new(layer_of.len());
+        let mut column = vec![0.0; layer_of.len()];
+        for (number, weight) in self.weights.iter().enumerate() {
+            let own = self.column(number);
+            column.iter_mut().zip(layer_of).for_each(|(light, &layer)| *light = own[layer]);
+            all.add(&column, *weight);
+        }
+        all
+    }
+
     /// Returns the columns side by side.
     pub(crate) fn finish(self) -> PixelColumns {
         let block = |first: usize| {

@@ -4,7 +4,7 @@ use lamp_stack::Image;
 use rayon::prelude::*;
 
 use super::columns::{ColumnSet, PixelColumns};
-use super::part::{TimedPart, fill_window};
+use super::part::{TimedPart, fill_window, runs_in_window};
 use crate::blur::{Blur, LANES};
 use crate::light::Light;
 
@@ -19,9 +19,36 @@ pub(crate) struct Gather<'a> {
     blur: Blur<f32>,
     /// The light of each level, scaled so that a wide white field has 1.
     light_of: Vec<f32>,
+    taps: WindowTaps,
     side: usize,
     /// The rows and columns where any layer is not black, and around them as far as light spreads.
     tiles: Vec<[i64; 2]>,
+}
+
+/// The weights of the pixels around one, from the first that matters to the last.
+struct WindowTaps {
+    /// The sum of the weights along a row before each pixel, and of all at the end.
+    before: Vec<f64>,
+    /// The weights of rows.
+    across: Vec<f64>,
+    /// The light of a wide field of light 1.
+    field: f32,
+}
+
+impl WindowTaps {
+    fn of(blur: &Blur<f32>) -> Self {
+        let [along, across] = blur.taps();
+        let reach = blur.radius();
+        let all = |taps: &[f32]| -> Vec<f64> {
+            let tap = |place: usize| taps.get(place.abs_diff(reach)).copied().unwrap_or(0.0);
+            (0..=2 * reach).map(|place| f64::from(tap(place))).collect()
+        };
+        let mut before = vec![0.0];
+        for weight in all(along) {
+            before.push(before[before.len() - 1] + weight);
+        }
+        Self { before, across: all(across), field: blur.sum() as f32 }
+    }
 }
 
 /// Working space of a thread.
@@ -45,7 +72,8 @@ impl<'a> Gather<'a> {
         // work (6/4)² = 2.25 times as much, and wider tiles save little of that.
         let fits = |&side: &usize| side <= 4 * blur.radius() && bytes(side) <= MOST_TILE_BYTES;
         let side = SIDES.into_iter().rev().find(fits).unwrap_or(SIDES[0]);
-        let mut gather = Self { part, blur, light_of, side, tiles: Vec::new() };
+        let taps = WindowTaps::of(&blur);
+        let mut gather = Self { part, blur, light_of, taps, side, tiles: Vec::new() };
         gather.tiles = gather.lit_tiles();
         gather
     }
@@ -96,11 +124,12 @@ impl<'a> Gather<'a> {
     }
 
     /// Returns all columns, or a sample of them that takes no more than `bytes`, and the number of
-    /// pixels that each sampled column stands for.
-    pub(crate) fn columns(&self, bytes: usize) -> (PixelColumns, u32) {
+    /// pixels that each sampled column stands for. Samples of one pixel in less than `least` x `least`
+    /// are not tried.
+    pub(crate) fn columns(&self, bytes: usize, least: u32) -> (PixelColumns, u32) {
         let layers = self.part.images.len();
         let most = (bytes / (layers * size_of::<f32>())).max(1);
-        let mut step = 1;
+        let mut step = least;
         // Merging would have to join over 16 pixels in each column, or over 4 in each of a sample, whose
         // pixels are farther apart: these are not tried.
         while self.pixels() / (step as usize * step as usize)
@@ -154,41 +183,37 @@ impl<'a> Gather<'a> {
 
     /// Returns the light of some pixels, layer by layer.
     fn light_of_pixels(&self, pixels: &[[i64; 2]]) -> Vec<Vec<f32>> {
-        let of_layer = |levels: &mut Vec<u8>, image: &Image| {
+        let of_layer = |image: &Image| {
             let blocks = Blocks::of(image, self.blur.radius());
-            let light = |&pixel: &[i64; 2]| self.light_of_pixel(image, &blocks, pixel, levels);
+            let light = |&pixel: &[i64; 2]| self.light_of_pixel(image, &blocks, pixel);
             pixels.iter().map(light).collect()
         };
-        self.part.images.par_iter().map_init(Vec::new, of_layer).collect()
+        self.part.images.par_iter().map(of_layer).collect()
     }
 
     /// Returns the light of a pixel, whose sign is its role.
-    fn light_of_pixel(
-        &self,
-        image: &Image,
-        blocks: &Blocks,
-        pixel: [i64; 2],
-        levels: &mut Vec<u8>,
-    ) -> f32 {
+    fn light_of_pixel(&self, image: &Image, blocks: &Blocks, pixel: [i64; 2]) -> f32 {
         let reach = self.blur.radius();
         let role = |level: u8| if level >= self.part.wanted() { -1.0 } else { 1.0 };
         // Most pixels are far from any edge. Their light is the same number as in tiles.
         if let Some(level) = blocks.level_around(pixel, reach as i64) {
-            return self.light_of[usize::from(level)] * self.blur.sum() as f32 * role(level);
+            return self.light_of[usize::from(level)] * self.taps.field * role(level);
         }
-        let side = 2 * reach + 1;
-        levels.resize(side * side, 0);
-        fill_window(image, pixel.map(|place| place - reach as i64), side, levels);
-        let [along, across] = self.blur.taps();
-        let tap = |taps: &[f32], place: usize| taps.get(place.abs_diff(reach)).copied();
-        let mut sum = 0.0;
-        for (row, line) in levels.chunks_exact(side).enumerate() {
-            let Some(weight) = tap(across, row) else { continue };
-            let lights = line.iter().map(|&level| self.light_of[usize::from(level)]);
-            let lit = lights.enumerate().map(|(at, light)| light * tap(along, at).unwrap_or(0.0));
-            sum += weight * lit.sum::<f32>();
+        let [column, first] = pixel.map(|place| place - reach as i64);
+        let WindowTaps { before, across, .. } = &self.taps;
+        let black = f64::from(self.light_of[0]);
+        let (mut sum, mut own) = (black * f64::from(self.taps.field), 0);
+        for (row, weight) in (first..).zip(across) {
+            // A run weighs as much as the weights between its ends: most rows have one or two.
+            runs_in_window(image, [column, row], 2 * reach + 1, |from, to, level| {
+                let light = f64::from(self.light_of[usize::from(level)]) - black;
+                sum += weight * light * (before[to] - before[from]);
+                if row == pixel[1] && (from..to).contains(&reach) {
+                    own = level;
+                }
+            });
         }
-        sum * role(levels[reach * side + reach])
+        sum as f32 * role(own)
     }
 
     /// Returns the light at a pixel in each layer.
@@ -203,50 +228,62 @@ impl<'a> Gather<'a> {
         self.part.images.iter().map(of_layer).collect()
     }
 
-    /// Computes the light of a window of a layer.
-    fn spread(&self, image: &Image, window: TileWindow, room: &mut TileRoom) {
+    /// Computes the light of a window of a layer. Returns whether it may differ from the last one.
+    fn spread(&self, image: &Image, window: TileWindow, room: &mut TileRoom) -> bool {
         let pixels = window.width() * window.rows();
         room.levels.resize(pixels, 0);
         let corner = window.corner.map(|place| place - window.radius as i64);
         fill_window(image, corner, window.width(), &mut room.levels);
         // Straight vertical walls give the same window layer after layer.
         if room.levels == room.spread_levels {
-            return;
+            return false;
         }
         room.spread_levels.clone_from(&room.levels);
         let first = room.levels[0];
         // Inside and outside of the part, the blur is a known sum.
         if room.levels.iter().all(|&level| level == first) {
-            let field = self.light_of[usize::from(first)] * self.blur.sum() as f32;
+            let field = self.light_of[usize::from(first)] * self.taps.field;
             room.spread.clear();
             room.spread.resize(pixels, field);
-            return;
+            return true;
         }
         room.image.clear();
         room.image.extend(room.levels.iter().map(|&level| self.light_of[usize::from(level)]));
         room.spread.resize(pixels, 0.0);
         self.blur.apply(&room.image, window.width(), &mut room.spread, &mut room.blur);
+        true
     }
 
     /// Computes the columns of one tile. Columns without light are left out.
     fn tile(&self, corner: [i64; 2], room: &mut TileRoom) -> ColumnSet {
         let (layers, side) = (self.part.images.len(), self.side);
         let window = TileWindow { corner, side, radius: self.blur.radius() };
-        let mut light = vec![0.0_f32; side * side * layers];
+        // Straight vertical walls give the same light layer after layer: it is kept once.
+        let mut planes: Vec<Vec<f32>> = Vec::new();
+        let mut plane_of = Vec::with_capacity(layers);
         room.spread_levels.clear();
-        for (layer, image) in self.part.images.iter().enumerate() {
-            self.spread(image, window, room);
-            for number in 0..side * side {
-                let place = window.place([number % side, number / side]);
-                let wanted = room.levels[place] >= self.part.wanted();
+        for image in &self.part.images {
+            if self.spread(image, window, room) {
+                let rows = (0..side).flat_map(|row| {
+                    let from = window.place([0, row]);
+                    let levels = room.levels[from..from + side].iter();
+                    levels.zip(&room.spread[from..from + side])
+                });
                 // Zeros carry the sign too, so that voxels without light keep their role.
-                let sign = if wanted { -1.0 } else { 1.0 };
-                light[number * layers + layer] = room.spread[place] * sign;
+                let signed = |(level, light): (&u8, &f32)| {
+                    if *level >= self.part.wanted() { -light } else { *light }
+                };
+                planes.push(rows.map(signed).collect());
             }
+            plane_of.push(planes.len() - 1);
         }
-        let mut columns = ColumnSet::new(layers);
-        light.chunks_exact(layers).for_each(|column| columns.add_lit(column, 1.0));
-        columns
+        let mut columns = ColumnSet::new(planes.len());
+        let mut column = vec![0.0; planes.len()];
+        for pixel in 0..side * side {
+            column.iter_mut().zip(&planes).for_each(|(light, plane)| *light = plane[pixel]);
+            columns.add_lit(&column, 1.0);
+        }
+        columns.repeated(&plane_of)
     }
 }
 
@@ -451,8 +488,8 @@ mod tests {
     fn a_sample_stands_for_all_pixels() {
         let part = part(&cavity_staircase(4));
         let gather = Gather::new(&part, &pegda(50.0));
-        let (all, one) = gather.columns(usize::MAX);
-        let (some, many) = gather.columns(240 * 4 * 600);
+        let (all, one) = gather.columns(usize::MAX, 1);
+        let (some, many) = gather.columns(240 * 4 * 600, 1);
         assert!(one == 1 && many > 1);
         // The wanted voxels of each layer, and their light.
         let sums = |columns: &PixelColumns, layer: usize| {

@@ -4,6 +4,7 @@
 //! their doses. [`plan`] finds the times with the least error, and bounds the error of any others.
 
 mod columns;
+mod dose_curve;
 mod feasible;
 mod gather;
 mod hinge;
@@ -15,6 +16,7 @@ mod tally;
 pub(crate) mod testing;
 mod times_table;
 
+pub(crate) use dose_curve::DoseGrid;
 pub use feasible::{Platform, PlatformError, Speed};
 pub use part::{PartError, PartPages, TimedLayer, TimedPart};
 pub(crate) use plan::times_of;

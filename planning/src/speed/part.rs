@@ -205,33 +205,46 @@ impl TimedPart {
 pub(crate) fn fill_window(image: &Image, [column, row]: [i64; 2], width: usize, levels: &mut [u8]) {
     levels.fill(0);
     for (row, line) in (row..).zip(levels.chunks_exact_mut(width)) {
-        if !(0..i64::from(image.height())).contains(&row) {
-            continue;
-        }
-        match image {
-            Image::Mask(mask) => fill_row(mask, row as u32, column, line, |p| 255 * u8::from(p)),
-            Image::Gray(gray) => fill_row(gray, row as u32, column, line, |p| p),
-        }
+        runs_in_window(image, [column, row], width, |from, to, level| line[from..to].fill(level));
     }
 }
 
-fn fill_row<C: Change>(
+/// Calls `each` with the runs of a row of pixels that begins at (`column`, `row`): begin and end,
+/// counted from there, and the level. Pixels outside the image have no run.
+pub(crate) fn runs_in_window(
+    image: &Image,
+    [column, row]: [i64; 2],
+    width: usize,
+    each: impl FnMut(usize, usize, u8),
+) {
+    if !(0..i64::from(image.height())).contains(&row) {
+        return;
+    }
+    match image {
+        Image::Mask(mask) => {
+            runs_of_row(mask, row as u32, [column, width as i64], |p| 255 * u8::from(p), each);
+        }
+        Image::Gray(gray) => runs_of_row(gray, row as u32, [column, width as i64], |p| p, each),
+    }
+}
+
+fn runs_of_row<C: Change>(
     image: &RunImage<C>,
     row: u32,
-    column: i64,
-    line: &mut [u8],
+    [column, width]: [i64; 2],
     level: impl Fn(C::Pixel) -> u8,
+    mut each: impl FnMut(usize, usize, u8),
 ) {
     let changes = image.row(row);
     // The level at the window's left edge is the level after the last change before the edge.
     let past = changes.partition_point(|change| i64::from(change.column()) <= column);
-    let end = (column + line.len() as i64).min(i64::from(image.width()));
+    let end = (column + width).min(i64::from(image.width()));
     let (mut from, mut pixel) = (column.max(0), C::last_pixel(&changes[..past]));
     let ends = changes[past..].iter().map(|change| (i64::from(change.column()), Some(change)));
     for (to, change) in ends.chain([(end, None)]) {
         let to = to.min(end);
         if from < to {
-            line[(from - column) as usize..(to - column) as usize].fill(level(pixel));
+            each((from - column) as usize, (to - column) as usize, level(pixel));
             from = to;
         }
         if to == end {

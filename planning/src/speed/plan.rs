@@ -12,7 +12,7 @@ use crate::light::Light;
 use crate::numeric::{DescentEnd, descend};
 
 /// Changes when the same options and layers give other times.
-pub const SPEED_CODE: u32 = 2;
+pub const SPEED_CODE: u32 = 3;
 
 /// The light, platform and limits to plan for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,8 +89,11 @@ fn gap(stage: SearchStage, single_error: f64) -> f64 {
 /// The doses around the kink over which the error is smoothed, stage by stage.
 const SMOOTHINGS: [f64; 6] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001];
 // Six stages of this many steps, each a pass over all columns, bound the time of a plan.
-/// The steps of a stage.
-const STEPS: usize = 300;
+/// When a stage ends.
+const END: DescentEnd = DescentEnd { steps: 300, fall: 1e-9 };
+/// When a stage ends for a light that is not known well: it may be planned for many times.
+const SOON: DescentEnd = DescentEnd { steps: 60, fall: 1e-6 };
+
 /// Finds the times of a part's layers.
 ///
 /// # Errors
@@ -99,7 +102,7 @@ const STEPS: usize = 300;
 pub fn plan(part: &TimedPart, options: &SpeedOptions) -> Result<SpeedPlan, SpeedPlanError> {
     let feasible = Feasible::new(&options.platform, part.layers())?;
     let simulation = Simulation::new(part, &options.light, options.memory)?;
-    let problem = TimesProblem { simulation: &simulation, feasible, options };
+    let problem = TimesProblem { simulation: &simulation, feasible, options, end: END };
     let (single, single_error) = problem.best_single();
     let (times, stages) = problem.search(&single, single_error);
     let [before, after] = simulation.tally([&single, &times]);
@@ -125,7 +128,7 @@ pub(crate) fn times_of(
     options: &SpeedOptions,
 ) -> Result<Vec<f64>, PlatformError> {
     let feasible = Feasible::new(&options.platform, layers)?;
-    let problem = TimesProblem { simulation, feasible, options };
+    let problem = TimesProblem { simulation, feasible, options, end: SOON };
     let (single, single_error) = problem.best_single();
     Ok(problem.search(&single, single_error).0)
 }
@@ -134,6 +137,7 @@ struct TimesProblem<'a> {
     simulation: &'a Simulation<'a>,
     feasible: Feasible,
     options: &'a SpeedOptions,
+    end: DescentEnd,
 }
 
 impl TimesProblem<'_> {
@@ -212,8 +216,7 @@ impl TimesProblem<'_> {
             .map(|ends| ends.iter().zip(&scale).map(|(end, scale)| end / scale).collect());
         let [low, high]: [Vec<f64>; 2] = bounds;
         let mut x = vec![1.0; scale.len()];
-        let stop = DescentEnd { steps: STEPS, fall: 1e-9 };
-        descend(&mut x, [&low, &high], stop, |x| {
+        descend(&mut x, [&low, &high], self.end, |x| {
             let times: Vec<_> = x.iter().zip(&scale).map(|(x, scale)| x * scale).collect();
             let priced = self.price(&times, smoothing);
             let (mut error, mut slopes) = (priced.error, priced.slopes);

@@ -1,6 +1,7 @@
 //! Computes the cure by given times.
 
 use super::columns::PixelColumns;
+use super::dose_curve::{DoseCurves, DoseGrid};
 use super::gather::Gather;
 use super::part::{PartError, TimedPart};
 use super::tally::{GradualWrong, Tally, gradual_wrong};
@@ -29,10 +30,21 @@ impl<'a> Simulation<'a> {
     /// # Errors
     /// Returns an error if the model's numbers are impossible.
     pub fn new(part: &'a TimedPart, light: &Light, memory: u64) -> Result<Self, PartError> {
+        Self::sampled_by(part, light, memory, 1)
+    }
+
+    /// Prepares a part as [`new`](Self::new) does. Each column stands for `least` pixels or more: the
+    /// same part needed so many under a similar light.
+    pub(crate) fn sampled_by(
+        part: &'a TimedPart,
+        light: &Light,
+        memory: u64,
+        least: u32,
+    ) -> Result<Self, PartError> {
         let layers = reaches(part, light)?;
         let gather = Gather::new(part, light);
         let bytes = (memory / COLUMNS_SHARE).min(MOST_COLUMN_BYTES);
-        let (columns, sampled) = gather.columns(bytes as usize);
+        let (columns, sampled) = gather.columns(bytes as usize, least.isqrt());
         Ok(Self { gather, layers, columns, sampled })
     }
 
@@ -72,6 +84,12 @@ impl<'a> Simulation<'a> {
     /// over this range around the critical dose.
     pub(crate) fn gradual_wrong(&self, times: &[f64], half_range: f64) -> Vec<GradualWrong> {
         gradual_wrong(&self.columns, &self.layers, times, half_range)
+    }
+
+    /// Counts the wrong voxels of each layer, or of all together, where all doses are larger by some
+    /// factors.
+    pub(crate) fn dose_curves(&self, times: &[f64], grid: &DoseGrid, by_layer: bool) -> DoseCurves {
+        DoseCurves::of(&self.columns, &self.layers, times, grid, by_layer)
     }
 
     /// Returns the dose of each layer under a wide white field.
