@@ -25,13 +25,17 @@ pub enum MeasuredError {
     /// It has only a header.
     #[error("there are no measurements below the header")]
     Empty,
-    /// A standard deviation is not above zero.
-    #[error("line {line}, column sd_um: {sd_um} is not above zero")]
+    /// A standard deviation is below what can be measured.
+    #[error(
+        "line {line}, column sd_um: {sd_um} um is finer than any measurement: write {least} or more"
+    )]
     Deviation {
         /// The line, from 1.
         line: usize,
         /// The standard deviation.
         sd_um: f64,
+        /// The least that is possible.
+        least: f64,
     },
     /// A place is listed twice.
     #[error("line {line}: this place was measured in line {first}, too")]
@@ -89,6 +93,9 @@ pub enum JobFileError {
     /// It was changed after it was written.
     #[error("{0} differs from the file that lamp learn wrote: bring it back, or begin another job")]
     Changed(String),
+    /// It is missing.
+    #[error("the file is missing: bring it back, or begin another job")]
+    Missing,
     /// It is not TOML with the keys of a job.
     #[error(transparent)]
     Toml(#[from] toml::de::Error),
@@ -173,19 +180,6 @@ pub enum JobError {
         print: usize,
         /// The last print.
         last: usize,
-    },
-    /// The measurements repeat an earlier print's, word for word.
-    #[error(
-        "{}: these are the measurements of print {earlier}, given twice: measure print {print}",
-        folder.display()
-    )]
-    GivenTwice {
-        /// The job.
-        folder: PathBuf,
-        /// The print that they were given for.
-        earlier: usize,
-        /// The print that they are given for now.
-        print: usize,
     },
     /// The same measurements were used before with other options.
     #[error(

@@ -219,8 +219,14 @@ impl Job {
     }
 
     fn read_print(&self, number: usize) -> Result<JobPrint, JobError> {
-        let times = self.read_column(&profile_name(number), &PROFILE, 3)?;
+        let profile = self.folder.join(profile_name(number));
+        let table = read_sealed(&profile, MAX_TABLE, "a table of times").map_err(at(&profile))?;
+        let times = self.column_of(&table, &PROFILE, 3).map_err(at(&profile))?;
         let state = self.folder.join(state_name(number));
+        let needs_state = table.lines().any(|line| line == planned_for(number));
+        if needs_state && !state.exists() {
+            return Err(at(&state)(JobFileError::Missing));
+        }
         let read_state = || -> Result<_, JobFileError> {
             let text = read_sealed(&state, MAX_TABLE, "a state of light and resin")?;
             Ok(toml::from_str::<LightState>(&text)?)
@@ -236,7 +242,7 @@ impl Job {
         };
         let measured_and_text = is_learnt_from.then(read).transpose().map_err(at(&measured))?;
         if times.iter().any(|ms| *ms <= 0.0) {
-            return Err(at(&self.folder.join(profile_name(number)))(JobFileError::NoTime));
+            return Err(at(&profile)(JobFileError::NoTime));
         }
         Ok(JobPrint {
             times: times.iter().map(|ms| ms / 1000.0).collect(),
@@ -245,27 +251,22 @@ impl Job {
         })
     }
 
-    /// Reads a number of each layer, from the light on.
-    fn read_column<const N: usize>(
+    /// Returns a number of each layer of a table, from the light on.
+    fn column_of<const N: usize>(
         &self,
-        name: &str,
+        table: &str,
         columns: &'static [&'static str; N],
         column: usize,
-    ) -> Result<Vec<f64>, JobError> {
-        let file = self.folder.join(name);
-        let read = || -> Result<Vec<f64>, JobFileError> {
-            let text = read_sealed(&file, MAX_TABLE, "a table of times")?;
-            let rows = CsvTable::parse(&text)?.numbers(columns, column + 1)?;
-            let layers = self.part.layers();
-            let is_layer = |(row, layer): (&NumberRow<N>, &TimedLayer)| {
-                row.numbers[0] == Some(f64::from(layer.index))
-            };
-            if rows.len() != layers.len() || !rows.iter().rev().zip(layers).all(is_layer) {
-                return Err(JobFileError::OtherLayers);
-            }
-            Ok(rows.iter().rev().filter_map(|row| row.numbers[column]).collect())
+    ) -> Result<Vec<f64>, JobFileError> {
+        let rows = CsvTable::parse(table)?.numbers(columns, column + 1)?;
+        let layers = self.part.layers();
+        let is_layer = |(row, layer): (&NumberRow<N>, &TimedLayer)| {
+            row.numbers[0] == Some(f64::from(layer.index))
         };
-        read().map_err(at(&file))
+        if rows.len() != layers.len() || !rows.iter().rev().zip(layers).all(is_layer) {
+            return Err(JobFileError::OtherLayers);
+        }
+        Ok(rows.iter().rev().filter_map(|row| row.numbers[column]).collect())
     }
 
     /// Returns the print that was measured: the last one, unless another is requested.
@@ -282,20 +283,12 @@ impl Job {
         }
     }
 
-    /// Rejects measurements that were given for an earlier print, word for word.
-    ///
-    /// # Errors
-    /// Returns an error if they were.
-    pub fn refuse_known(&self, print: usize, text: &str) -> Result<(), JobError> {
+    /// Returns the earlier print whose measurements were the same, word for word.
+    pub fn print_measured_as(&self, text: &str) -> Option<usize> {
         let same = |print: &JobPrint| {
             print.measured.as_ref().is_some_and(|(_, known)| is_same(known, text))
         };
-        match self.prints.iter().position(same) {
-            Some(earlier) => {
-                Err(JobError::GivenTwice { folder: self.folder.clone(), earlier, print })
-            }
-            None => Ok(()),
-        }
+        self.prints.iter().position(same)
     }
 
     /// Returns the files that keep the measurements and results, in the order in which they must be
@@ -315,8 +308,18 @@ impl Job {
         let end = if text.ends_with('\n') { "" } else { "\n" };
         files.push(file(measured_name(print), &format!("{text}{end}")));
         // The print exists once its times do.
-        files.push(file(profile_name(print + 1), &self.profile(&learned.times)));
+        files.push(file(profile_name(print + 1), &self.kept_profile(print + 1, learned)));
         files
+    }
+
+    /// Returns the table of times that the job keeps. It names the state, so that a missing one is
+    /// noticed.
+    fn kept_profile(&self, print: usize, learned: &Learned) -> String {
+        let table = self.profile(&learned.times);
+        match learned.lesson {
+            Lesson::State(_) => format!("{table}{}\n", planned_for(print)),
+            Lesson::Law { .. } => table,
+        }
     }
 
     /// Goes back to the state before the last print was learned from, if these are its
@@ -342,7 +345,7 @@ impl Job {
         let name = profile_name(print + 1);
         let file = self.folder.join(&name);
         let before = read_sealed(&file, MAX_TABLE, "a table of times").map_err(at(&file))?;
-        if before == self.profile(&learned.times) {
+        if before == self.kept_profile(print + 1, learned) {
             return Ok(());
         }
         Err(JobError::OtherOptions { folder: self.folder.clone(), print, name })
@@ -384,6 +387,11 @@ fn is_same(a: &str, b: &str) -> bool {
 
 fn measured_name(print: usize) -> String {
     format!("print-{print:03}-measured.csv")
+}
+
+/// Returns the line of a table of times that were planned for a state.
+fn planned_for(print: usize) -> String {
+    format!("# planned for {}", state_name(print))
 }
 
 fn state_name(print: usize) -> String {

@@ -10,6 +10,8 @@ const HEIGHTS: [&str; 5] = ["x_mm", "y_mm", "z_mm", "measured_mm", "sd_um"];
 const AREAS: [&str; 3] = ["layer", "over_px", "under_px"];
 /// The standard deviation of heights that do not state one.
 const USUAL_SD_UM: f64 = 20.0;
+/// The least standard deviation of heights, in micrometers: steps between atoms are not much smaller.
+const LEAST_SD_UM: f64 = 0.001;
 
 /// The measurements of a print.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,8 +126,8 @@ impl PrintMeasurements {
         for NumberRow { line, numbers: [x, y, z, measured, sd] } in table.numbers(&HEIGHTS, 4)? {
             let number = |number: Option<f64>| number.unwrap_or_default();
             let sd_um = sd.unwrap_or(USUAL_SD_UM);
-            if sd_um <= 0.0 {
-                return Err(MeasuredError::Deviation { line, sd_um });
+            if sd_um < LEAST_SD_UM {
+                return Err(MeasuredError::Deviation { line, sd_um, least: LEAST_SD_UM });
             }
             let row = HeightRow {
                 line,
@@ -197,8 +199,11 @@ mod tests {
         assert_eq!(refused(half), MeasuredError::NotALayer { line: 2, layer: 7.5 });
         let twice = "layer,over_px,under_px\n7,1,0\n7,2,0\n";
         assert_eq!(refused(twice), MeasuredError::SameLayer { line: 3, layer: 7, first: 2 });
-        let exact = "x_mm,y_mm,z_mm,measured_mm,sd_um\n1,2,3,2.9,0\n";
-        assert_eq!(refused(exact), MeasuredError::Deviation { line: 2, sd_um: 0.0 });
+        for sd_um in [0.0, -1.0, 1e-9] {
+            let exact = format!("x_mm,y_mm,z_mm,measured_mm,sd_um\n1,2,3,2.9,{sd_um}\n");
+            let refusal = MeasuredError::Deviation { line: 2, sd_um, least: LEAST_SD_UM };
+            assert_eq!(refused(&exact), refusal);
+        }
         let place = "x_mm,y_mm,z_mm,measured_mm\n1,2,3,2.9\n1,2,3,2.8\n";
         assert_eq!(refused(place), MeasuredError::SamePlace { line: 3, first: 2 });
     }

@@ -30,7 +30,34 @@ pub enum PlatformError {
     /// The allowed change of speed is not above zero, or not a number.
     #[error("the change of speed must be above zero: {0}")]
     Change(f64),
+    /// A layer's time asks for a speed beyond the platform's.
+    #[error(
+        "layer {layer} passes at {speed:.3} um/s: the platform's speeds are {slowest} to {fastest} um/s"
+    )]
+    Time {
+        /// The layer's index in its stack.
+        layer: u32,
+        /// The speed that its time asks for.
+        speed: Speed,
+        /// The slowest speed of the platform.
+        slowest: Speed,
+        /// The fastest.
+        fastest: Speed,
+    },
+    /// The times of two layers ask for a larger change of speed than the platform's.
+    #[error("from layer {} to layer {}, the speed changes by {:.1} %: {:.1} % are allowed", layers[0], layers[1], 100.0 * change, 100.0 * most)]
+    Ratio {
+        /// The layers' indices in their stack, the lower one first.
+        layers: [u32; 2],
+        /// The change, as a share of the slower speed.
+        change: f64,
+        /// The largest change of the platform.
+        most: f64,
+    },
 }
+
+/// Recorded times are rounded: a time is beyond a limit if it is by this share.
+const ROUNDED: f64 = 1e-3;
 
 impl Platform {
     /// Returns the shortest and the longest time of each layer, in seconds.
@@ -40,6 +67,32 @@ impl Platform {
     pub fn bounds(&self, layers: &[TimedLayer]) -> Result<[Vec<f64>; 2], PlatformError> {
         let feasible = Feasible::new(self, layers)?;
         Ok([feasible.low, feasible.high])
+    }
+
+    /// Checks that the platform can keep some times, in seconds, the layer nearest to the light first.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot, or if its numbers are impossible.
+    pub fn check(&self, layers: &[TimedLayer], times: &[f64]) -> Result<(), PlatformError> {
+        Feasible::new(self, layers)?;
+        let speeds: Vec<_> =
+            layers.iter().zip(times).map(|(layer, time)| layer.thickness.um() / time).collect();
+        // A print begins with the lowest layer, so that is named first.
+        for (layer, &speed) in layers.iter().zip(&speeds).rev() {
+            let (slowest, fastest) = (self.slowest, self.fastest);
+            if speed < slowest * (1.0 - ROUNDED) || speed > fastest * (1.0 + ROUNDED) {
+                return Err(PlatformError::Time { layer: layer.index, speed, slowest, fastest });
+            }
+        }
+        let Some(most) = self.max_change else { return Ok(()) };
+        for (two, layers) in speeds.windows(2).zip(layers.windows(2)).rev() {
+            let change = (two[0] / two[1]).max(two[1] / two[0]) - 1.0;
+            if change > most + ROUNDED {
+                let layers = [layers[1].index, layers[0].index];
+                return Err(PlatformError::Ratio { layers, change, most });
+            }
+        }
+        Ok(())
     }
 
     /// Returns times that the platform can keep, near those given, in seconds.

@@ -37,7 +37,7 @@ const WRITERS: &[&str] = &[
     "lamp mesh-out good.tif -o out.stl",
     "lamp mesh repair ball.stl -o out.stl",
     "lamp plan speed good.tif --material pegda-sudan -o out.tif",
-    "lamp learn out/ --start good.tif --material pegda-sudan",
+    "lamp learn out/ --start good.tif --speed 1um/s..2mm/s --material pegda-sudan",
     "lamp target squares --sizes 4 --doses 60,90mJ/cm2 --intensity 1W/cm2 --dpi 100 -o out/",
     "lamp target scan --widths 4 --doses 60,90mJ/cm2 --intensity 1W/cm2 --dpi 100 -o out/",
     "lamp sample cube -o out.stl",
@@ -113,7 +113,7 @@ fn scratch() -> Scratch {
         "lamp sample tower --facets 2k --defect drop --count 20 --seed 7 -q -o broken.stl",
         "slice broken.stl --dpi 100 --thickness 2mm -q -o stray.tif",
         "tile good.tif --area 2x2in --mesh none -q --recipe build.json",
-        "lamp learn job --start good.tif --material pegda-sudan -q",
+        "lamp learn job --start good.tif --speed 1um/s..2mm/s --material pegda-sudan -q",
     ] {
         scratch.run(line).succeeds();
     }

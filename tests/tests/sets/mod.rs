@@ -48,7 +48,7 @@ const READERS: &[&str] = &[
     "lamp split S --every 2 -o out/",
     "lamp plan speed S --material pegda-sudan -o out.tif",
     "lamp plan voxels S --material pegda-sudan -o out.tif",
-    "lamp learn out/ --start S --material pegda-sudan",
+    "lamp learn out/ --start S --speed 1um/s..2mm/s --material pegda-sudan",
     "lamp cure S --material lamp-suspension --section y=0mm -o out.png",
     "lamp mesh-out S -o out.stl",
     "lamp job S --machine scan.toml -o out/",

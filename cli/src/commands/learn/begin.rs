@@ -62,8 +62,17 @@ pub(super) fn begin(
     if folder.join(JobFile::NAME).exists() {
         return Err(refuse_second(folder, stack, &digest)?);
     }
-    let part_pages = pages.finish().map_err(|error| Exit::from(error).at(name))?;
+    let part_pages = pages.finish().map_err(|error| Exit::from(error).at(name.clone()))?;
     let platform = kept.platform();
+    let seconds: Vec<_> = part_pages
+        .layers()
+        .iter()
+        .map(|layer| layer.time.map_or(0.0, |time| time.ms() / 1000.0))
+        .collect();
+    platform.check(part_pages.layers(), &seconds).map_err(|error| {
+        let limits = "--speed and --max-change of the platform that prints, or plan other times";
+        Exit::Failed(anyhow!("{error}: give {limits}")).at(name.clone())
+    })?;
     let margin = kept.dose_margin.unwrap_or(0.05);
     let job = JobFile {
         part,

@@ -179,7 +179,11 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     let may_be_again = args.print.is_none_or(|print| print + 1 == last);
     let again = if may_be_again { job.take_back(&text) } else { None };
     let print_number = again.map_or_else(|| job.print_to_learn_from(args.print), Ok)?;
-    job.refuse_known(print_number, &text)?;
+    if let Some(earlier) = job.print_measured_as(&text) {
+        progress.say(&format!(
+            "warning: print {print_number} has the same measurements as print {earlier}, to the letter"
+        ));
+    }
     let learned = learn(&job, print_number, &measured, args.method(), memory)
         .map_err(|error| Exit::from(error).at(name))?;
     match again {

@@ -1,6 +1,8 @@
 //! Plots the errors and the times of a job's prints (004 figures 3.7 and 3.8).
 
-use lamp_planning::learn::{Job, JobPrint, LightState, PrintError, PrintMeasurements};
+use lamp_planning::learn::{
+    AreaRow, Factor, Job, JobPrint, LightState, PrintError, PrintMeasurements,
+};
 use lamp_planning::speed::TimedLayer;
 
 use super::report::error_of;
@@ -21,10 +23,12 @@ pub(super) fn plots_of(job: &Job) -> Vec<Plot> {
     let mut plots = Vec::new();
     plots.extend(course(job));
     plots.extend(states(job));
-    let areas: Vec<_> = drawn.iter().filter_map(|&(n, print)| areas(job, n, print)).collect();
-    if !areas.is_empty() {
-        let title = "Pixels to cure in each layer; below zero: too many are cured".to_owned();
-        plots.push(by_layer(title, "pixels", areas));
+    for (title, count) in AREAS {
+        let areas = drawn.iter().filter_map(|&(n, print)| areas(job, n, print, count));
+        let areas: Vec<_> = areas.collect();
+        if !areas.is_empty() {
+            plots.push(by_layer(title.to_owned(), "pixels", areas));
+        }
     }
     let heights: Vec<_> = drawn.iter().filter_map(|&(n, print)| heights(n, print)).collect();
     if !heights.is_empty() {
@@ -41,6 +45,15 @@ pub(super) fn plots_of(job: &Job) -> Vec<Plot> {
     plots.push(by_layer("Time of each layer".to_owned(), "exposure (s)", times.collect()));
     plots
 }
+
+/// A count of a layer.
+type Count = fn(&AreaRow) -> f64;
+
+/// The counts of layers, each in a plot of its own.
+const AREAS: [(&str, Count); 2] = [
+    ("Pixels of the part that are not cured, by layer", |row| row.under),
+    ("Pixels that are cured outside the part, by layer", |row| row.over),
+];
 
 /// The errors from print to print.
 fn course(job: &Job) -> Vec<Plot> {
@@ -75,23 +88,28 @@ fn states(job: &Job) -> Option<Plot> {
     let of_number = |(at, name): (usize, &&str)| {
         let points: Vec<_> =
             states.iter().map(|(number, factors)| (*number, factors[at].value)).collect();
-        Series { points: points.clone(), ..curve(name, points) }
+        let band = states.iter().map(|(number, factors)| {
+            let [low, high] = factors[at].interval();
+            [*number, low, high]
+        });
+        Series { points: points.clone(), band: band.collect(), ..curve(name, points) }
     };
     let series: Vec<_> = LightState::NAMES.iter().enumerate().map(of_number).collect();
-    let values = || states.iter().flat_map(|(_, factors)| factors.map(|factor| factor.value));
-    let (low, high) = (values().fold(1.0, f64::min), values().fold(1.0, f64::max));
-    let title = "Light and resin that each print was planned for".to_owned();
+    let ends = || states.iter().flat_map(|(_, factors)| factors.map(Factor::interval));
+    let low = ends().fold(1.0, |least: f64, ends| least.min(ends[0]));
+    let high = ends().fold(1.0, |most: f64, ends| most.max(ends[1]));
+    let title = "Light and resin that each print was planned for, with 95 % intervals".to_owned();
     let x = linear("print", -0.5..job.prints.len() as f64 - 0.5);
     let y = linear("times the material's", 0.9 * low..1.1 * high);
     (!states.is_empty()).then_some(Plot { title, x, y, series })
 }
 
-fn areas(job: &Job, number: usize, print: &JobPrint) -> Option<Series> {
+fn areas(job: &Job, number: usize, print: &JobPrint, count: Count) -> Option<Series> {
     let (PrintMeasurements::Areas(rows), _) = print.measured.as_ref()? else { return None };
     let layers = job.part.layers().iter().rev();
     let place = |layer: &TimedLayer| {
         let row = rows.iter().find(|row| row.layer == layer.index)?;
-        Some((layer.z.mm(), row.under - row.over))
+        Some((layer.z.mm(), count(row)))
     };
     Some(curve(&format!("print {number}"), layers.filter_map(place).collect()))
 }

@@ -14,7 +14,12 @@ use crate::output::numbers::grouped;
 /// The lines that are printed.
 pub(super) fn lines_of(job: &Job, print: usize, learned: &Learned) -> String {
     let errors: Vec<_> = job.prints.iter().filter_map(error_of).map(text_of).collect();
-    let mut text = format!("errors of prints 0 to {print}: {}\n", errors.join(", "));
+    let prints = if print == 0 {
+        "error of print 0".to_owned()
+    } else {
+        format!("errors of prints 0 to {print}")
+    };
+    let mut text = format!("{prints}: {}\n", errors.join(", "));
     if let Some((best, least)) = best_of(job) {
         text += &format!("best print so far: {best}, {}\n", text_of(least));
         let last = error_of(&job.prints[print]);
@@ -124,9 +129,9 @@ struct LearnHead<'a> {
 struct Expected {
     /// Mean number of wrong pixels.
     wrong_px: f64,
-    /// Fewest wrong pixels.
+    /// Lower end of the 95 % interval of wrong pixels.
     fewest_px: f64,
-    /// Most wrong pixels.
+    /// Upper end of the 95 % interval of wrong pixels.
     most_px: f64,
     /// The print from whose times the step begins.
     from_print: usize,
@@ -140,11 +145,11 @@ struct Expected {
 struct StateLine {
     /// Its name.
     number: &'static str,
-    /// The most probable factor.
+    /// The mean factor, of its logarithm over the probable states.
     value: f64,
     /// The ends of its 95 % interval.
     interval: [f64; 2],
-    /// The most probable factor before the print was measured.
+    /// The mean factor before the print was measured.
     before: f64,
     /// The ends of its 95 % interval.
     interval_before: [f64; 2],
