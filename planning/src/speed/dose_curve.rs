@@ -32,8 +32,8 @@ impl DoseGrid {
         self.middle + (number as f64 - self.half as f64) * self.step
     }
 
-    /// Returns the first factor with which a dose is the critical one or more; their count if there
-    /// is none.
+    /// Returns the first factor with which a dose is the critical one or more, or their count if
+    /// no factor is large enough.
     fn first_cured(&self, dose: f64) -> usize {
         let first = self.half as f64 - (dose.ln() + self.middle) / self.step;
         first.ceil().clamp(0.0, self.count() as f64) as usize
