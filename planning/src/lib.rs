@@ -4,6 +4,7 @@
 //!   voxel, from a material's numbers.
 //! - [`Blur`] spreads the light of an image sideways.
 //! - [`speed`] plans the time of each layer, [`learn`] corrects it after every print.
+//! - [`print_sim`] prints on a simulated machine, and measures the print.
 //! - [`cure_section`] computes the resin that a stack cures along a vertical section.
 //! - Planners on a fixed glass start from a [`projector`] and a [`target`], and write a
 //!   [`PlanFolder`].
@@ -18,6 +19,7 @@ pub mod learn;
 mod light;
 mod numeric;
 mod plan_folder;
+pub mod print_sim;
 pub mod projector;
 mod region;
 mod resin_light;

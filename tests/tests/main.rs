@@ -62,6 +62,7 @@ mod plan_simulate;
 mod plan_speed;
 mod plot_tables;
 mod povray;
+mod print_sim;
 mod printers;
 mod projector;
 mod ranges;

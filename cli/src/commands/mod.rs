@@ -33,6 +33,7 @@ mod mesh_out;
 mod orient;
 mod pack;
 pub(crate) mod plan;
+mod print_sim;
 mod projector;
 mod report;
 mod sample;
@@ -81,6 +82,7 @@ pub(crate) enum Command {
     Projector(projector::ProjectorArgs),
     Plan(plan::PlanArgs),
     Learn(learn::LearnArgs),
+    PrintSim(print_sim::PrintSimArgs),
     Cure(cure::CureArgs),
     Calibrate(calibrate::CalibrateArgs),
     Target(target::TargetArgs),
@@ -140,6 +142,7 @@ impl Command {
             Self::Projector(args) => projector::run(args),
             Self::Plan(args) => plan::run(args, common),
             Self::Learn(args) => learn::run(args, common),
+            Self::PrintSim(args) => print_sim::run(args, common),
             Self::Cure(args) => cure::run(args, common),
             Self::Calibrate(args) => calibrate::run(args, common),
             Self::Target(args) => target::run(args, common),

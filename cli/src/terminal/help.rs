@@ -12,7 +12,7 @@ Make    slice       cut a part into layers   fix         correct stray rows
         tile        lay out copies           compose     make pages of a recipe
         edit        change a design          support     hold islands
         orient      find an orientation      heights     find thicknesses
-        batch       run jobs overnight
+        batch       run jobs overnight       job         plan the scan
 Look    view        see layers in a browser  show        draw layers
         info        describe a stack         report      write a page to send
         mesh-out    write the surface        cure        draw what is cured
@@ -22,7 +22,7 @@ Prove   check       find islands, pockets    verify      find damage
 Light   plan        plan exposures           learn       learn from a print
         calibrate   make a resin file        target      make test images
         material    list, check resins       projector   list, check projectors
-        machine     list, make machines      job         plan the scan
+        machine     list, make machines      print-sim   simulate a print
 Files   convert     change the format        pack        pack a stack
         join split  join, split layers       frames      write what is shown
 Set up  demo        run all on a sample      sample      write a sample part

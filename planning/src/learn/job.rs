@@ -10,7 +10,6 @@
 //! print-001.csv           the times of the next
 //! ```
 
-use std::cmp::Ordering;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -196,7 +195,7 @@ impl Job {
 
     /// Returns a job that is not in a folder.
     #[cfg(test)]
-    pub(super) fn of_part(
+    pub(crate) fn of_part(
         part: TimedPart,
         light: Light,
         material: Material,
@@ -269,17 +268,28 @@ impl Job {
         Ok(rows.iter().rev().filter_map(|row| row.numbers[column]).collect())
     }
 
+    /// Returns the print that is requested: the last one, if none is.
+    ///
+    /// # Errors
+    /// Returns an error if it was never planned.
+    pub fn print_of(&self, asked: Option<usize>) -> Result<usize, JobError> {
+        let last = self.prints.len() - 1;
+        let print = asked.unwrap_or(last);
+        match print > last {
+            true => Err(JobError::NotPlanned { folder: self.folder.clone(), print, last }),
+            false => Ok(print),
+        }
+    }
+
     /// Returns the print that was measured: the last one, unless another is requested.
     ///
     /// # Errors
     /// Returns an error if it is not the last.
     pub fn print_to_learn_from(&self, asked: Option<usize>) -> Result<usize, JobError> {
-        let last = self.prints.len() - 1;
-        let (print, folder) = (asked.unwrap_or(last), self.folder.clone());
-        match print.cmp(&last) {
-            Ordering::Greater => Err(JobError::NotPlanned { folder, print, last }),
-            Ordering::Less => Err(JobError::LearntFrom { folder, print, last }),
-            Ordering::Equal => Ok(print),
+        let (print, last) = (self.print_of(asked)?, self.prints.len() - 1);
+        match print < last {
+            true => Err(JobError::LearntFrom { folder: self.folder.clone(), print, last }),
+            false => Ok(print),
         }
     }
 
@@ -366,7 +376,17 @@ impl Job {
         self.file.margin
     }
 
-    pub(super) fn origin_mm(&self) -> Option<[f64; 2]> {
+    /// Returns the name of the part.
+    pub(crate) fn part_name(&self) -> &str {
+        &self.file.part
+    }
+
+    /// Returns the digest of the stack's file.
+    pub(crate) fn digest(&self) -> &str {
+        &self.file.digest
+    }
+
+    pub(crate) fn origin_mm(&self) -> Option<[f64; 2]> {
         self.file.origin_mm
     }
 }

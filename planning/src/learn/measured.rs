@@ -121,6 +121,24 @@ impl PrintMeasurements {
         Ok(measured)
     }
 
+    /// Returns the table, which [`parse`](Self::parse) reads.
+    pub fn to_csv(&self) -> String {
+        let (columns, rows): (&[&str], Vec<String>) = match self {
+            Self::Heights(rows) => {
+                let line = |row: &HeightRow| {
+                    let [x, y] = row.place_mm;
+                    format!("{x},{y},{},{},{}\n", row.z_mm, row.measured_mm, row.sd_um)
+                };
+                (&HEIGHTS, rows.iter().map(line).collect())
+            }
+            Self::Areas(rows) => {
+                let line = |row: &AreaRow| format!("{},{},{}\n", row.layer, row.over, row.under);
+                (&AREAS, rows.iter().map(line).collect())
+            }
+        };
+        format!("{}\n{}", columns.join(","), rows.concat())
+    }
+
     fn heights(table: &CsvTable) -> Result<Self, MeasuredError> {
         let mut rows: Vec<HeightRow> = Vec::new();
         for NumberRow { line, numbers: [x, y, z, measured, sd] } in table.numbers(&HEIGHTS, 4)? {

@@ -1,5 +1,5 @@
-//! Numerical methods that are independent of light: descent between bounds, and equations of small
-//! matrices.
+//! Numerical methods that are independent of light: descent between bounds, equations of small
+//! matrices, and random numbers.
 //!
 //! Each adds numbers in one order, whatever the number of threads, so that plans are the same to
 //! the last bit.
@@ -7,10 +7,12 @@
 mod bounded;
 mod cholesky;
 mod lbfgs;
+mod random;
 
 pub(crate) use bounded::{Bounded, CurvatureMatrix, SearchPlace};
 pub(crate) use cholesky::solve_positive;
 pub(crate) use lbfgs::{DescentEnd, descend};
+pub(crate) use random::Random;
 
 /// Returns the sum of products, from the first to the last.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -1,12 +1,12 @@
 //! Computes the light of pixel columns, tile by tile.
 
-use lamp_stack::Image;
+use lamp_stack::{Image, Mask, MaskBuilder};
 use rayon::prelude::*;
 
 use super::columns::{ColumnSet, PixelColumns};
 use super::part::{TimedPart, fill_window, runs_in_window};
 use crate::blur::{Blur, LANES};
-use crate::light::Light;
+use crate::light::{LayerLight, Light};
 
 /// Sides of tiles. Where light spreads far, the rims of small tiles cost more than the tiles.
 const SIDES: [usize; 4] = [64, 128, 256, 512];
@@ -226,6 +226,81 @@ impl<'a> Gather<'a> {
             room.spread[window.place([0, 0])]
         };
         self.part.images.iter().map(of_layer).collect()
+    }
+
+    /// Returns the pixels of each layer that times cure, in images that are larger than the part's: to
+    /// each side by the distance to which light spreads, which is returned, too.
+    pub(crate) fn cured(&self, layers: &[LayerLight], times: &[f64]) -> (Vec<Mask>, usize) {
+        let radius = self.blur.radius();
+        let [width, height] = self.part.size().map(|pixels| pixels + 2 * radius as u32);
+        let mut masks = vec![MaskBuilder::new(width); layers.len()];
+        let mut tiles = self.tiles.as_slice();
+        for first in (0..height).step_by(self.side) {
+            let y = i64::from(first) - radius as i64;
+            let (of_band, others) = tiles.split_at(tiles.partition_point(|tile| tile[1] <= y));
+            tiles = others;
+            let cured = |room: &mut TileRoom, corner: &[i64; 2]| {
+                self.cured_in_tile(*corner, layers, times, room)
+            };
+            let of_tiles: Vec<_> = of_band.par_iter().map_init(TileRoom::default, cured).collect();
+            let rows = self.side.min((height - first) as usize);
+            for (layer, mask) in masks.iter_mut().enumerate() {
+                for row in 0..rows {
+                    let mut transitions: Vec<u32> = Vec::new();
+                    let of_row = of_tiles.iter().flat_map(|runs| &runs[layer * self.side + row]);
+                    for &[from, to] in of_row {
+                        // A run may go on from tile to tile.
+                        match transitions.last_mut() {
+                            Some(last) if *last == from => *last = to,
+                            _ => transitions.extend([from, to]),
+                        }
+                    }
+                    // Cured to the image's edge, which only light without spread reaches.
+                    let transitions = transitions.strip_suffix(&[width]).unwrap_or(&transitions);
+                    mask.push_row(transitions).expect("runs are in order, and in the image");
+                }
+            }
+        }
+        (masks.into_iter().map(MaskBuilder::finish).collect(), radius)
+    }
+
+    /// Returns the runs of cured pixels of one tile, row by row and layer by layer: each its first
+    /// column, from the left edge of lit pixels, and the column after its last.
+    fn cured_in_tile(
+        &self,
+        corner: [i64; 2],
+        layers: &[LayerLight],
+        times: &[f64],
+        room: &mut TileRoom,
+    ) -> Vec<Vec<[u32; 2]>> {
+        let window = TileWindow { corner, side: self.side, radius: self.blur.radius() };
+        let left = (corner[0] + self.blur.radius() as i64) as u32;
+        let width = self.part.size()[0] + 2 * self.blur.radius() as u32;
+        let columns = self.side.min((width - left) as usize);
+        let mut doses = vec![0.0_f32; self.side * self.side];
+        let mut all = Vec::with_capacity(layers.len() * self.side);
+        room.spread_levels.clear();
+        for ((image, layer), time) in self.part.images.iter().zip(layers).zip(times) {
+            self.spread(image, window, room);
+            // As columns are exposed, to the last bit: the same voxels are cured.
+            let (passed, own) = (layer.passed as f32, (layer.own * time) as f32);
+            for row in 0..self.side {
+                let mut runs: Vec<[u32; 2]> = Vec::new();
+                let of_row = &mut doses[row * self.side..][..columns];
+                let light = &room.spread[window.place([0, row])..][..columns];
+                for (column, (dose, light)) in (left..).zip(of_row.iter_mut().zip(light)) {
+                    *dose = *dose * passed + own * light;
+                    if *dose >= 1.0 {
+                        match runs.last_mut() {
+                            Some(run) if run[1] == column => run[1] += 1,
+                            _ => runs.push([column, column + 1]),
+                        }
+                    }
+                }
+                all.push(runs);
+            }
+        }
+        all
     }
 
     /// Computes the light of a window of a layer. Returns whether it may differ from the last one.

@@ -153,10 +153,19 @@ impl TimedPart {
 
     /// Returns the number of pixels of a layer that belong to the part.
     pub fn wanted_px(&self, layer: usize) -> u64 {
-        let image = &self.images[layer];
-        let runs = (0..image.height()).flat_map(|row| image.runs(row));
-        let wanted = runs.filter(|run| run.2 >= self.wanted);
-        wanted.map(|(from, to, _)| u64::from(to - from)).sum()
+        let runs = (0..self.size()[1]).flat_map(|row| self.wanted_runs(layer, row));
+        runs.map(|[from, to]| u64::from(to - from)).sum()
+    }
+
+    /// Returns the runs of a row's pixels that belong to the part: each its first column and the
+    /// column after its last. Neighbors may touch.
+    pub(crate) fn wanted_runs(
+        &self,
+        layer: usize,
+        row: u32,
+    ) -> impl Iterator<Item = [u32; 2]> + use<'_> {
+        let wanted = self.images[layer].runs(row).filter(|run| run.2 >= self.wanted);
+        wanted.map(|(from, to, _)| [from, to])
     }
 
     /// Returns the length of the part's outline in each layer, in sides of pixels.

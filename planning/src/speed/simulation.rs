@@ -1,5 +1,7 @@
 //! Computes the cure by given times.
 
+use lamp_stack::Mask;
+
 use super::columns::PixelColumns;
 use super::dose_curve::{DoseCurves, DoseGrid};
 use super::gather::Gather;
@@ -123,6 +125,12 @@ impl<'a> Simulation<'a> {
     /// Returns the dose of a pixel in each layer, in units of the critical dose.
     pub fn doses_at(&self, pixel: [u32; 2], times: &[f64]) -> Vec<f64> {
         self.doses_of(&self.light_at(pixel), times)
+    }
+
+    /// Returns the pixels of each layer that are cured, the layer nearest to the light first. Images
+    /// are larger than the part's: to each side by a number of pixels, which is returned, too.
+    pub(crate) fn cured(&self, times: &[f64]) -> (Vec<Mask>, usize) {
+        self.gather.cured(&self.layers, times)
     }
 
     /// Returns the light of a pixel in each layer.

@@ -49,6 +49,7 @@ const WRITERS: &[&str] = &[
     "lamp heights ball.stl --csv out.csv",
     "lamp orient ball.stl --directions 20 --plot out.svg",
     "lamp learn job --measured a.csv --law single -o out.csv",
+    "lamp print-sim job -o out.csv",
     "lamp job good.tif --machine scan.toml -o out/",
     "lamp frames good.tif --machine scan.toml --layer 2 --swath 0 -o out.frames",
 ];

@@ -64,6 +64,7 @@ const OTHERS: &[&str] = &[
     "demo",
     "view",
     "expose",
+    "print-sim",
     "compose",
     "batch",
     "machine",

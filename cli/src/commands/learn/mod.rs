@@ -216,10 +216,22 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
 }
 
 /// Opens a job.
-fn open(folder: &Path, progress: &Progress) -> Result<Job, Exit> {
+pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Job, Exit> {
     let job = Job::open(folder, read_beside);
     progress.done();
     job
+}
+
+/// Refuses an output in the folder of a job, whose files are sealed.
+pub(super) fn check_outside_job(job: &Path, output: &Path) -> Result<(), Exit> {
+    let folder = output.parent().map(|folder| if folder == "" { Path::new(".") } else { folder });
+    let folder = folder.and_then(|folder| fs::canonicalize(folder).ok());
+    let job = fs::canonicalize(job).ok();
+    if job.is_some() && folder == job {
+        let name = output.display();
+        return Err(Exit::usage(format!("{name} is in the job's folder: name another file")));
+    }
+    Ok(())
 }
 
 /// Reads what was measured, and its text.
@@ -239,16 +251,8 @@ impl LearnArgs {
         let files: Vec<_> =
             self.output.iter().chain(self.report.path()).chain(&self.plot).collect();
         let measured = measured.to_owned();
-        let job = fs::canonicalize(&self.job).ok();
         for (number, path) in files.iter().enumerate() {
-            let folder =
-                path.parent().map(|folder| if folder == "" { Path::new(".") } else { folder });
-            let folder = folder.and_then(|folder| fs::canonicalize(folder).ok());
-            if job.is_some() && folder == job {
-                let sealed =
-                    format!("{} is in the job's folder: name another file", path.display());
-                return Err(Exit::usage(sealed));
-            }
+            check_outside_job(&self.job, path)?;
             let others = std::iter::once(&measured).chain(files[..number].iter().copied());
             check_beside(path, Path::new("-"), others)?;
         }

@@ -1,0 +1,338 @@
+//! `lamp print-sim`: prints a job on a simulated machine, and measures the print.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+use lamp_grayscale::material::Material;
+use lamp_pipeline::documents::{document, is_file, own_file};
+use lamp_pipeline::heights::significant;
+use lamp_pipeline::memory;
+use lamp_planning::learn::{PrintError, PrintMeasurements};
+use lamp_planning::print_sim::{PrintSimError, SimulatedPrint, Truth};
+use lamp_stack::Length;
+use serde::Serialize;
+
+use super::learn::{check_outside_job, open};
+use crate::args::options::{Common, Output, parse_count};
+use crate::catalogue::read_text;
+use crate::exit::Exit;
+use crate::output::endings::parse_table;
+use crate::output::json_report::{print_answer, schemas};
+use crate::output::numbers::{grouped, number_of};
+use crate::streams::{
+    check_beside, check_not_input, input_name, is_stream, print, stack_format, write_file,
+    write_layers,
+};
+use crate::terminal::progress::Progress;
+
+/// Truths are texts of a few lines.
+const MAX_TRUTH: u64 = 1 << 20;
+/// The noise of heights that are measured without --noise.
+const HEIGHT_NOISE: Length = Length::from_um(20.0);
+/// The most places: lamp learn compares each with all others.
+const MOST_PLACES: usize = 10_000;
+
+/// Print a job on a simulated machine, and measure the print
+///
+/// The machine prints the last print of a job of lamp learn with a truth of its own: light and
+/// resin that differ from the job's material. Its measurements are the table that lamp learn
+/// --measured reads: the wrong pixels of each layer, or with --heights the heights of faces that
+/// look down. So the whole loop of printing and learning runs without a machine.
+///
+/// A truth is a TOML file. Each key is a change, such as "+25%", or a value: penetration-depth,
+/// critical-dose, light, spread; drift is the change of the light from print to print. Left out
+/// keys are as in the job's material, or as in another one that the key material names.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp print-sim job/ --truth plant.toml --noise 2% -o measured.csv
+  lamp print-sim job/ --truth plant.toml --heights 1000 --noise 2um -o heights.csv
+  lamp print-sim job/ --body printed.tif -o measured.csv")]
+pub(crate) struct PrintSimArgs {
+    /// Folder of the job
+    #[arg(value_name = "JOB")]
+    job: PathBuf,
+
+    /// How light and resin differ from the job's material [default: not at all]
+    #[arg(long, value_name = "FILE.toml")]
+    truth: Option<PathBuf>,
+
+    /// The print to simulate: 0 is the first [default: the last]
+    #[arg(long, value_name = "N")]
+    print: Option<usize>,
+
+    /// Measure heights at this many random places of faces that look down, instead of wrong pixels
+    #[arg(long, value_name = "N", value_parser = parse_places)]
+    heights: Option<usize>,
+
+    /// Standard deviation of the measurements: of counts a share of each, such as 2%, of heights a
+    /// length, such as 2um [default: 0% of counts, 20um of heights]
+    #[arg(long, value_name = "NOISE", value_parser = parse_noise)]
+    noise: Option<Noise>,
+
+    /// Random seed of noise and places: the same seed gives a print the same table
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+
+    /// Write the printed body as a stack, too: the layers as cured
+    #[arg(long, value_name = "STACK")]
+    body: Option<PathBuf>,
+
+    /// Where to write the measurements: a file, or - for standard output
+    #[arg(short, long, value_name = "MEASURED.csv", default_value = "-", value_parser = parse_table)]
+    output: PathBuf,
+
+    /// Print the true light and the print's errors as JSON, as docs/json.md describes it
+    #[arg(long)]
+    json: bool,
+}
+
+/// How far measurements are off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Noise {
+    /// A share of each count.
+    Share(f64),
+    /// A length, for heights.
+    Length(Length),
+}
+
+/// A simulated print, by `lamp print-sim ... --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct PrintSimAnswer<'a> {
+    /// Number of the print, from 0.
+    print: usize,
+    /// Name of the material that the truth changes.
+    material: &'a str,
+    /// True penetration depth, in micrometers.
+    penetration_depth_um: f64,
+    /// True critical dose, in mJ/cm2.
+    critical_dose_mj_per_cm2: f64,
+    /// True light of full white in this print, in mW/cm2.
+    intensity_mw_per_cm2: f64,
+    /// True standard deviations of the spread of light along rows and columns, in micrometers.
+    spread_um: [f64; 2],
+    /// Seed of noise and places.
+    seed: u64,
+    /// Pixels of all layers that are cured outside the part, exactly.
+    over_px: u64,
+    /// Pixels of the part in all layers that are not cured, exactly.
+    under_px: u64,
+    /// Measured wrong pixels of all layers, with noise, or null with heights.
+    measured_px: Option<f64>,
+    /// Root mean square by which measured heights are off, in micrometers, or null without heights.
+    rms_um: Option<f64>,
+    /// Places of heights, or null without heights.
+    places: Option<usize>,
+    /// Places that have no height since nothing is cured there, or null without heights.
+    uncured_places: Option<usize>,
+}
+
+schemas! { "lamp-print-sim-1": PrintSimAnswer<'_>; }
+
+/// What was measured, and facts for the line that is printed.
+struct Measured {
+    table: PrintMeasurements,
+    /// The places that have no height.
+    uncured: Option<usize>,
+}
+
+pub(crate) fn run(args: &PrintSimArgs, common: &Common) -> Result<(), Exit> {
+    args.check_outputs()?;
+    let progress = Progress::new("print-sim", common, true);
+    let (truth, truth_name) = match &args.truth {
+        Some(path) => (read_truth(path)?, input_name(path)),
+        None => (Truth::default(), input_name(&args.job)),
+    };
+    let job = open(&args.job, &progress)?;
+    let number = job.print_of(args.print)?;
+    let material = match &truth.material {
+        Some(word) => document(&args.beside_truth(word))?,
+        None => job.material.clone(),
+    };
+    let memory = memory::available() / 4;
+    let failed = |error: PrintSimError| Exit::Failed(error.into());
+    let simulated = SimulatedPrint::new(&job, number, &material, &truth, memory)
+        .map_err(|error| failed(error).at(truth_name))?;
+    let at_job = |error: PrintSimError| failed(error).at(input_name(&args.job));
+    let measured = args.measure(&simulated).map_err(at_job)?;
+    if let Some(body) = &args.body {
+        let layers = simulated.body(format!("print-sim --print {number}")).map_err(at_job)?;
+        write_layers(layers.into_iter().map(Ok), &body_output(body), &progress)?;
+    }
+    let table = measured.table.to_csv();
+    match is_stream(&args.output) {
+        true => print(&table)?,
+        false => write_file(&args.output, |out| out.write_all(table.as_bytes()))?,
+    }
+    progress.wrote(&args.output, &facts(number, &measured));
+    if args.json {
+        let answer = answer(args, number, &material, &simulated, &measured);
+        return print_answer("lamp-print-sim-1", &answer);
+    }
+    Ok(())
+}
+
+impl PrintSimArgs {
+    /// Checks the options, and the names of outputs, before the work.
+    fn check_outputs(&self) -> Result<(), Exit> {
+        match (self.noise, self.heights) {
+            (Some(Noise::Length(_)), None) => {
+                return Err(Exit::usage(
+                    "counts of pixels have a share as their --noise, such as 2%; a length is for \
+                     --heights",
+                ));
+            }
+            (Some(Noise::Share(_)), Some(_)) => {
+                return Err(Exit::usage(
+                    "heights have a length as their --noise, such as 2um; a share is for counts of \
+                     pixels",
+                ));
+            }
+            _ => {}
+        }
+        if self.json && is_stream(&self.output) {
+            return Err(Exit::usage(
+                "standard output cannot take both the table and its JSON: name a file with -o",
+            ));
+        }
+        let outputs = std::iter::once(&self.output).chain(&self.body);
+        for output in outputs.filter(|output| !is_stream(output)) {
+            check_outside_job(&self.job, output)?;
+            check_not_input(output, &self.truth)?;
+        }
+        let Some(body) = &self.body else {
+            return check_beside(&self.output, Path::new("-"), &self.truth);
+        };
+        if is_stream(body) {
+            return Err(Exit::usage("name a file for the body, such as --body printed.tif"));
+        }
+        stack_format(&body_output(body))?;
+        check_beside(&self.output, body, &self.truth)
+    }
+
+    /// Returns where the truth's material is: a name as it is, a file beside the truth's.
+    fn beside_truth(&self, word: &str) -> PathBuf {
+        let path = Path::new(word);
+        let folder = self.truth.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
+        match is_file::<Material>(path) && own_file::<Material>(path).is_none() {
+            true => folder.join(path),
+            false => path.to_owned(),
+        }
+    }
+
+    fn measure(&self, print: &SimulatedPrint<'_>) -> Result<Measured, PrintSimError> {
+        let Some(places) = self.heights else {
+            let noise = match self.noise {
+                Some(Noise::Share(share)) => share,
+                _ => 0.0,
+            };
+            return Ok(Measured { table: print.areas(noise, self.seed), uncured: None });
+        };
+        let sd = match self.noise {
+            Some(Noise::Length(length)) => length,
+            _ => HEIGHT_NOISE,
+        };
+        let heights = print.heights(places, sd, self.seed)?;
+        Ok(Measured { table: heights.measured, uncured: Some(heights.uncured) })
+    }
+}
+
+/// Returns the output of the body.
+fn body_output(body: &Path) -> Output {
+    let (classic, packbits, force) = (false, false, false);
+    Output { output: body.to_owned(), format: None, classic, packbits, force }
+}
+
+/// Returns the facts of the line that is printed.
+fn facts(print: usize, measured: &Measured) -> Vec<String> {
+    let error = match (measured.table.error(), &measured.table) {
+        (PrintError::Micrometers(um), PrintMeasurements::Heights(rows)) => {
+            let places = number_of(rows.len() as u64, "place");
+            format!("heights at {places} are {} um off (RMS)", significant(um))
+        }
+        (error, _) => format!("{} wrong pixels", grouped(error.number() as u64)),
+    };
+    let uncured = measured.uncured.filter(|uncured| *uncured > 0);
+    let uncured = uncured.map(|uncured| format!("{} uncured", number_of(uncured as u64, "place")));
+    [format!("print {print}"), error].into_iter().chain(uncured).collect()
+}
+
+fn answer<'a>(
+    args: &PrintSimArgs,
+    number: usize,
+    material: &'a Material,
+    print: &SimulatedPrint<'_>,
+    measured: &Measured,
+) -> PrintSimAnswer<'a> {
+    let (light, wrong) = (print.light(), print.tally().wrong());
+    let (measured_px, rms_um, places) = match (measured.table.error(), &measured.table) {
+        (PrintError::Pixels(wrong), _) => (Some(wrong), None, None),
+        (PrintError::Micrometers(um), PrintMeasurements::Heights(rows)) => {
+            (None, Some(um), Some(rows.len()))
+        }
+        (PrintError::Micrometers(um), _) => (None, Some(um), None),
+    };
+    PrintSimAnswer {
+        print: number,
+        material: &material.name,
+        penetration_depth_um: light.penetration_depth.um(),
+        critical_dose_mj_per_cm2: light.critical_dose.mj_per_cm2(),
+        intensity_mw_per_cm2: light.intensity.mw_per_cm2(),
+        spread_um: light.spread.map(Length::um),
+        seed: args.seed,
+        over_px: wrong.over,
+        under_px: wrong.under,
+        measured_px,
+        rms_um,
+        places,
+        uncured_places: measured.uncured,
+    }
+}
+
+fn read_truth(path: &Path) -> Result<Truth, Exit> {
+    let read =
+        || -> anyhow::Result<_> { Ok(Truth::parse(&read_text(path, MAX_TRUTH, "a truth")?)?) };
+    Ok(read().with_context(|| input_name(path))?)
+}
+
+fn parse_places(text: &str) -> Result<usize, String> {
+    match parse_count(text)? {
+        places @ 1..=MOST_PLACES => Ok(places),
+        _ => Err(format!("`{text}` is not a number of places from 1 to {MOST_PLACES}")),
+    }
+}
+
+fn parse_noise(text: &str) -> Result<Noise, String> {
+    let wrong =
+        || format!("`{text}` is no noise: write a share, such as 2%, or a length, such as 2um");
+    if let Some(percent) = text.strip_suffix('%') {
+        let percent: f64 = percent.trim().parse().map_err(|_| wrong())?;
+        return match (0.0..=100.0).contains(&percent) {
+            true => Ok(Noise::Share(percent / 100.0)),
+            false => Err(wrong()),
+        };
+    }
+    match text.parse::<Length>() {
+        Ok(length) if length.um() > 0.0 && length.um() <= 1e6 => Ok(Noise::Length(length)),
+        _ => Err(wrong()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_a_share_or_a_length() {
+        assert_eq!(parse_noise("2%"), Ok(Noise::Share(0.02)));
+        assert_eq!(parse_noise("0%"), Ok(Noise::Share(0.0)));
+        assert_eq!(parse_noise("2um"), Ok(Noise::Length(Length::from_um(2.0))));
+        for wrong in ["", "2", "-1%", "nan%", "0um", "-2um", "2mJ/cm2", "9m"] {
+            assert!(parse_noise(wrong).is_err(), "{wrong}");
+        }
+        assert!(parse_places("0").is_err() && parse_places("11k").is_err());
+        assert_eq!(parse_places("10k"), Ok(10_000));
+    }
+}

@@ -1,0 +1,15 @@
+//! A simulated machine: prints a job as a machine and a resin do that differ from the job's
+//! material, and measures the print as a person does.
+//!
+//! - [`Truth`] says how they differ.
+//! - [`SimulatedPrint`] counts the wrong pixels of a print, measures heights on it, and gives its
+//!   body as cured layers.
+
+mod error;
+mod faces;
+mod print;
+mod truth;
+
+pub use error::{PrintSimError, TruthError};
+pub use print::{CuredBody, SimulatedHeights, SimulatedPrint};
+pub use truth::{Change, TrueNumber, Truth};
