@@ -131,7 +131,7 @@ struct PrintSimAnswer<'a> {
 
 schemas! { "lamp-print-sim-1": PrintSimAnswer<'_>; }
 
-/// What was measured, and facts for the line that is printed.
+/// The measurements of a print.
 struct Measured {
     table: PrintMeasurements,
     /// The places that have no height.

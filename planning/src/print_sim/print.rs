@@ -12,8 +12,8 @@ use crate::light::Light;
 use crate::numeric::Random;
 use crate::speed::{Simulation, Tally, TimedLayer};
 
-/// Places are chosen by the seed alone, so that each print is measured at the same ones. Sequences of
-/// random numbers from 0 on are those of the prints.
+/// Places are chosen by the seed alone, so that each print is measured at the same ones. Prints have the
+/// sequences of random numbers from 0 on.
 const PLACES: u64 = u64::MAX;
 
 /// A print of a job on a machine whose light and resin are known.
