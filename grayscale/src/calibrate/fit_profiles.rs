@@ -11,7 +11,7 @@ use super::measurements::ProfilePoint;
 use super::student_t::t_95;
 use super::{Estimate, FitError};
 use crate::material::{CurveNumbers, GivenNumber, SpreadNumbers};
-use crate::resin::{Dose, GrayLevel};
+use crate::resin::{Dose, GrayLevel, Spread};
 
 /// The spread and the depth of light, found from profiles.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +41,8 @@ const WIDEST_LOG: f64 = 1.0;
 const WIDEST_MISFIT: f64 = 0.1;
 /// The numbers that are fitted: `σ`, `D_p`, `E_c` and `γ`.
 const NUMBERS: usize = 4;
+/// The steps to the foot of a point. Each is nearer by as much as its profile is straight.
+const FOOT_STEPS: usize = 4;
 /// The number that only gray squares show.
 const GAMMA: usize = 3;
 
@@ -50,8 +52,7 @@ const GAMMA: usize = 3;
 /// erf((w/2 + x) / √2 σ)) erf(w / √8 σ)` in the plane through its middle, and the edge has `E_c` (001 eq. 1
 /// to 5, 10 and section 5).
 ///
-/// Least squares of distances of points from their profiles, to first order: both coordinates have
-/// errors. Intervals come from the covariance, by Student's t, on a logarithmic scale. If points have no
+/// Least squares of distances of points from their profiles: both coordinates have errors. Intervals come from the covariance, by Student's t, on a logarithmic scale. If points have no
 /// doses, all were lit alike, and the critical dose stays unknown.
 ///
 /// # Errors
@@ -70,6 +71,15 @@ pub fn fit_profiles(points: &[ProfilePoint]) -> Result<ProfileFit, FitError> {
     if with_doses != 0 && with_doses != points.len() {
         return Err(FitError::SomeDoses { with: with_doses, all: points.len() });
     }
+    // A table of one half of a square lies around 0.35 sides; from its left edge, around 0.5.
+    let white = || points.iter().filter(|point| point.gray == GrayLevel::WHITE);
+    let places = || white().map(|point| point.place.um());
+    let middle =
+        (places().fold(f64::INFINITY, f64::min) + places().fold(f64::NEG_INFINITY, f64::max)) / 2.0;
+    let widest = white().map(|point| point.side.um()).fold(0.0, f64::max);
+    if middle.abs() > 0.42 * widest {
+        return Err(FitError::OffMiddle(middle));
+    }
     let model = ProfileModel::starts(points, grays)
         .into_iter()
         .filter_map(|start| start.fitted(points))
@@ -79,7 +89,10 @@ pub fn fit_profiles(points: &[ProfilePoint]) -> Result<ProfileFit, FitError> {
     let free = points.len() + LEAST_MORE - needed;
     let times = t_95(free).powi(2) * left / free as f64;
     let (matrix, _) = model.normal(points);
-    let covariance = inverse(matrix).ok_or(FitError::NoProfileFit)?;
+    let vague =
+        |what, unit, [low, high]: [f64; 2]| FitError::VagueProfiles { what, low, high, unit };
+    let spreads = [0.0, Spread::WIDEST.um()];
+    let covariance = inverse(matrix).ok_or_else(|| vague("the spread", "um", spreads))?;
     let half = |of: usize| (covariance[of][of] * times).max(0.0).sqrt();
     let names = ["the spread", "the penetration depth", "the critical dose", "gamma"];
     let units = ["um", "um", "mJ/cm2", ""];
@@ -94,7 +107,7 @@ pub fn fit_profiles(points: &[ProfilePoint]) -> Result<ProfileFit, FitError> {
             // Without doses, the third is the light over the edge's.
             let name = if of == 2 && with_doses == 0 { "the light" } else { names[of] };
             let unit = if of == 2 && with_doses == 0 { "" } else { units[of] };
-            return Err(FitError::VagueProfiles { what: name, low, high, unit });
+            return Err(vague(name, unit, [low, high]));
         }
     }
     let misfit = (left / points.len() as f64).sqrt();
@@ -110,7 +123,13 @@ pub fn fit_profiles(points: &[ProfilePoint]) -> Result<ProfileFit, FitError> {
         critical_dose: (with_doses > 0).then(|| Estimate::new(numbers[2], ends[2][0], ends[2][1])),
         misfit: Length::from_um(misfit),
         points: points.len(),
-        extent: Extent::of_doses(points.iter().filter_map(|point| point.dose)),
+        extent: Extent::of_doses(points.iter().filter_map(|point| {
+            // The dose behind the gray level.
+            let passed = point.gray.get().powf(numbers[GAMMA]);
+            point
+                .dose
+                .map(|dose| Dose::from_mj_per_cm2(round_significant(dose.mj_per_cm2() * passed, 6)))
+        })),
         model,
     })
 }
@@ -206,10 +225,21 @@ impl ProfileModel {
         (light - critical - depth.um() / fading, slope)
     }
 
-    /// Returns the distance of a point from its profile to first order in um, inside above zero.
+    /// Returns the distance of a point from its profile in um, inside above zero.
     fn distance(&self, point: &ProfilePoint) -> f64 {
-        let (excess, slope) = self.excess(point);
-        excess / slope.hypot((-self.logs[1]).exp())
+        let (inside, _) = self.excess(point);
+        let fall = -(-self.logs[1]).exp();
+        // The foot of the point: each step goes to where the profile would be if it were straight.
+        let mut away = [0.0; 2];
+        let mut foot = *point;
+        for _ in 0..FOOT_STEPS {
+            let (excess, slope) = self.excess(&foot);
+            let along = (excess - slope * away[0] - fall * away[1]) / (slope * slope + fall * fall);
+            away = [-slope * along, -fall * along];
+            foot.place = Length::from_um(point.place.um() + away[0]);
+            foot.depth = Length::from_um(point.depth.um() + away[1]);
+        }
+        away[0].hypot(away[1]).copysign(inside)
     }
 
     fn squares(&self, points: &[ProfilePoint]) -> f64 {
@@ -421,6 +451,34 @@ mod tests {
             .iter()
             .map(|it| ProfilePoint { place: Length::from_um(it.place.um() + 250.0), ..*it })
             .collect();
-        assert!(refused(&moved).contains("from the middle of"), "{}", refused(&moved));
+        assert!(refused(&moved).ends_with("measure x_um from the middle of the square"));
+        // One half of each square is enough.
+        let half: Vec<_> = all.iter().filter(|it| it.place.um() >= 0.0).copied().collect();
+        assert!((values(&fit_profiles(&half).unwrap())[0] / 60.0 - 1.0).abs() < 1e-4);
+    }
+
+    /// The distance of a point from a profile, by brute force over the profile.
+    #[test]
+    fn distances_are_those_of_the_nearest_place_of_the_profile() {
+        let model = ProfileModel { logs: [60.0_f64, 125.0, 20.0, 1.8].map(f64::ln), grays: true };
+        for point in squares([60.0, 125.0, 20.0, 1.8], 600.0, 500.0) {
+            for (right, down) in [(5.0, 3.0), (-6.0, 4.0), (3.0, -9.0), (-8.0, -2.0)] {
+                let place = Length::from_um(point.place.um() + right);
+                let off = ProfilePoint {
+                    place,
+                    depth: Length::from_um(point.depth.um() + down),
+                    ..point
+                };
+                let mut nearest = f64::INFINITY;
+                for step in -4000..=4000 {
+                    let at = Length::from_um(place.um() + f64::from(step) * 0.005);
+                    let flat = ProfilePoint { place: at, depth: Length::from_um(0.0), ..point };
+                    let depth = 125.0 * model.excess(&flat).0;
+                    nearest = nearest.min((at.um() - place.um()).hypot(depth - off.depth.um()));
+                }
+                let found = model.distance(&off).abs();
+                assert!((found - nearest).abs() < 0.05, "{off:?}: {found} for {nearest}");
+            }
+        }
     }
 }

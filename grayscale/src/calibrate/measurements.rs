@@ -493,8 +493,9 @@ pub fn profile_points(
             level.ok_or_else(|| gray.impossible(row, wanted))
         })?;
         let um = side.number(row)?;
-        if !LENGTHS.contains(&um) {
-            return Err(side.impossible(row, "a side from 0.001 um to 1 m"));
+        // Less is in millimeters: no projector has such squares.
+        if !(2.0..=*LENGTHS.end()).contains(&um) {
+            return Err(side.impossible(row, "a side from 2 um to 1 m"));
         }
         let at = place.number(row)?;
         if at.abs() > *LENGTHS.end() {
@@ -697,7 +698,7 @@ mod tests {
         assert_eq!(dosed.points[0].gray, GrayLevel::WHITE);
         for (row, words) in [
             ("0,300,0,55", "column gray: 0 is not a gray level above 0 (black)"),
-            ("1,0,0,55", "column side_um: 0 is not a side"),
+            ("1,0.5,0,55", "column side_um: 0.5 is not a side from 2 um"),
             ("1,300,2e6,55", "column x_um: 2e6 is not a place within 1 m"),
             ("1,300,x,55", "column x_um: `x` is not a number"),
         ] {

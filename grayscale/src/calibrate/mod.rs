@@ -334,10 +334,16 @@ pub enum FitError {
         /// The number of points.
         all: usize,
     },
+    /// The places are not measured from the middle of squares.
+    #[error(
+        "the places of white squares lie around x_um = {}, and their middle is 0: measure x_um from the \
+         middle of the square",
+        short(*.0)
+    )]
+    OffMiddle(f64),
     /// No spread of light fits the profiles.
     #[error(
-        "no light that spreads as a Gaussian and fades with depth has such profiles: check the columns, \
-         and that x_um is measured from the middle of the square"
+        "no light that spreads as a Gaussian and fades with depth has such profiles: check the columns"
     )]
     NoProfileFit,
     /// The interval of a number is too wide.
