@@ -463,7 +463,10 @@ impl NarrowRecord {
         if !self.is_long {
             return format!("{width} wide");
         }
-        format!("{width} wide and {} long", length_text(self.length_px, self.length_mm))
+        format!(
+            "{width} wide at its narrowest and {} long",
+            length_text(self.length_px, self.length_mm)
+        )
     }
 
     fn write(&self, f: &mut fmt::Formatter<'_>, place: &str) -> fmt::Result {
