@@ -3,13 +3,12 @@
 use clap::Args;
 use lamp_grayscale::resin::{ExposureTime, GrayLevel};
 use lamp_grayscale::target::gray_squares;
-use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
+use lamp_stack::{Dpi, Length};
 
 use super::screens::parse_level;
-use super::{parse_gap, whole_pixels};
+use super::{parse_gap, whole_pixels, write_gray};
 use crate::args::options::{Common, Output};
 use crate::exit::Exit;
-use crate::streams::{progress, write_layers};
 
 /// Write squares of several gray levels, to calibrate the spread of light and gamma
 ///
@@ -27,7 +26,7 @@ pub(super) struct GraysArgs {
     dpi: Dpi,
 
     /// Gray levels of the squares, from the left
-    #[arg(long, value_name = "PERCENT,...", value_delimiter = ',', value_parser = parse_level)]
+    #[arg(long, value_name = "PERCENT,...", value_delimiter = ',', value_parser = parse_lit_level)]
     #[arg(default_value = "100%,75%,50%,25%")]
     levels: Vec<GrayLevel>,
 
@@ -50,20 +49,7 @@ pub(super) struct GraysArgs {
 pub(super) fn run(args: &GraysArgs, common: &Common) -> Result<(), Exit> {
     let [side, gap] = [args.square, args.gap].map(|length| whole_pixels(length, args.dpi));
     let image = gray_squares(&args.levels, side, gap)?;
-    let stack = StackInfo {
-        part: "gray squares".to_owned(),
-        commands: vec![args.command()],
-        layers: Some(1),
-        ..StackInfo::default()
-    };
-    let info = PageInfo {
-        exposure_ms: args.expose.map(ExposureTime::ms),
-        stack: Some(stack),
-        ..PageInfo::default()
-    };
-    let layer = Layer { info, pitch: Some(args.dpi.into()), image: image.into() };
-    let progress = progress("target", common, &args.output);
-    write_layers(std::iter::once(Ok(layer)), &args.output, &progress)
+    write_gray(image, "gray squares", args.command(), (args.dpi, args.expose), &args.output, common)
 }
 
 impl GraysArgs {
@@ -73,4 +59,10 @@ impl GraysArgs {
         let Self { dpi, square, gap, .. } = self;
         format!("target grays --dpi {dpi} --levels {levels} --square {square} --gap {gap}")
     }
+}
+
+/// Parses a gray level in per cent, above black: black squares show nothing.
+fn parse_lit_level(text: &str) -> Result<GrayLevel, String> {
+    let level = parse_level(text)?;
+    if level.get() > 0.0 { Ok(level) } else { Err("it must be above 0%".to_owned()) }
 }

@@ -9,13 +9,14 @@ use std::path::Path;
 
 use clap::{Args, Subcommand};
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::Intensity;
+use lamp_grayscale::resin::{ExposureTime, Intensity};
 use lamp_grayscale::target::{TargetError, TargetExposure};
 use lamp_pipeline::documents::document;
-use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
+use lamp_stack::{Dpi, GrayMask, Layer, Length, PageInfo, StackInfo};
 
-use crate::args::options::{Common, parse_distance};
+use crate::args::options::{Common, Output, parse_distance};
 use crate::exit::Exit;
+use crate::streams::{progress, write_layers};
 use squares::Doses;
 
 /// Write test images to expose, measure and calibrate with
@@ -76,6 +77,31 @@ fn pages(
         info.other.insert("dose_mj_per_cm2".to_owned(), dose.into());
         Ok(Layer { info, pitch: Some(dpi.into()), image: exposure.image.into() })
     })
+}
+
+/// Writes a stack of one gray image.
+fn write_gray(
+    image: GrayMask,
+    part: &str,
+    command: String,
+    (dpi, expose): (Dpi, Option<ExposureTime>),
+    output: &Output,
+    common: &Common,
+) -> Result<(), Exit> {
+    let stack = StackInfo {
+        part: part.to_owned(),
+        commands: vec![command],
+        layers: Some(1),
+        ..StackInfo::default()
+    };
+    let info = PageInfo {
+        exposure_ms: expose.map(ExposureTime::ms),
+        stack: Some(stack),
+        ..PageInfo::default()
+    };
+    let layer = Layer { info, pitch: Some(dpi.into()), image: image.into() };
+    let progress = progress("target", common, output);
+    write_layers(std::iter::once(Ok(layer)), output, &progress)
 }
 
 /// A length in whole pixels, to the nearest.

@@ -3,12 +3,11 @@
 use clap::Args;
 use lamp_grayscale::resin::{ExposureTime, GrayLevel};
 use lamp_grayscale::target::screens;
-use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
+use lamp_stack::{Dpi, Length};
 
-use super::{parse_gap, whole_pixels};
+use super::{parse_gap, whole_pixels, write_gray};
 use crate::args::options::{Common, Output};
 use crate::exit::Exit;
-use crate::streams::{progress, write_layers};
 
 /// Write a gray tile, and screens of it with squares of several sizes
 ///
@@ -53,20 +52,7 @@ pub(super) struct ScreensArgs {
 pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Exit> {
     let gap = whole_pixels(args.gap, args.dpi);
     let image = screens(args.gray_level, args.tile, gap, &args.squares)?;
-    let stack = StackInfo {
-        part: "screens".to_owned(),
-        commands: vec![args.command()],
-        layers: Some(1),
-        ..StackInfo::default()
-    };
-    let info = PageInfo {
-        exposure_ms: args.expose.map(ExposureTime::ms),
-        stack: Some(stack),
-        ..PageInfo::default()
-    };
-    let layer = Layer { info, pitch: Some(args.dpi.into()), image: image.into() };
-    let progress = progress("target", common, &args.output);
-    write_layers(std::iter::once(Ok(layer)), &args.output, &progress)
+    write_gray(image, "screens", args.command(), (args.dpi, args.expose), &args.output, common)
 }
 
 impl ScreensArgs {
@@ -84,7 +70,7 @@ impl ScreensArgs {
 pub(super) fn parse_level(text: &str) -> Result<GrayLevel, String> {
     let percent =
         text.trim().strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
-    percent
-        .and_then(|percent| GrayLevel::new(percent / 100.0))
-        .ok_or_else(|| format!("`{text}` is not a gray level: write 0% (black) to 100% (white)"))
+    percent.and_then(|percent| GrayLevel::new(percent / 100.0)).ok_or_else(|| {
+        format!("`{text}` is not a gray level: write 0% (black) to 100% (white), such as 50%")
+    })
 }
