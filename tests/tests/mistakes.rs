@@ -30,7 +30,7 @@ const MISTAKES: &[(&str, Option<&str>)] = &[
     ("lamp chek part.tif", Some("check")),
     ("lamp verfy part.tif", Some("verify")),
     ("lamp slize part.stl", Some("slice")),
-    ("lamp print part.stl", None),
+    ("lamp print part.stl", Some("print-sim")),
     ("lamp render part.tif", None),
     ("lamp dcotor", Some("doctor")),
     // Values.

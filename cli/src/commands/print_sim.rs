@@ -21,8 +21,7 @@ use crate::output::endings::parse_table;
 use crate::output::json_report::{print_answer, schemas};
 use crate::output::numbers::{grouped, number_of};
 use crate::streams::{
-    check_beside, check_not_input, input_name, is_stream, print, stack_format, write_file,
-    write_layers,
+    check_beside, check_not_input, input_name, is_stream, print, write_file, write_layers,
 };
 use crate::terminal::progress::Progress;
 
@@ -75,8 +74,8 @@ pub(crate) struct PrintSimArgs {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 
-    /// Write the printed body as a stack, too: the layers as cured
-    #[arg(long, value_name = "STACK")]
+    /// Write the printed body as a TIFF stack, too: the layers as cured
+    #[arg(long, value_name = "BODY.tif")]
     body: Option<PathBuf>,
 
     /// Where to write the measurements: a file, or - for standard output
@@ -205,10 +204,12 @@ impl PrintSimArgs {
         let Some(body) = &self.body else {
             return check_beside(&self.output, Path::new("-"), &self.truth);
         };
-        if is_stream(body) {
-            return Err(Exit::usage("name a file for the body, such as --body printed.tif"));
+        let is_tiff = |end: &std::ffi::OsStr| {
+            ["tif", "tiff"].iter().any(|tiff| end.eq_ignore_ascii_case(tiff))
+        };
+        if !body.extension().is_some_and(is_tiff) {
+            return Err(Exit::usage("name a TIFF file for the body, such as --body printed.tif"));
         }
-        stack_format(&body_output(body))?;
         check_beside(&self.output, body, &self.truth)
     }
 
