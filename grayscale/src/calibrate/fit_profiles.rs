@@ -52,8 +52,9 @@ const GAMMA: usize = 3;
 /// erf((w/2 + x) / √2 σ)) erf(w / √8 σ)` in the plane through its middle, and the edge has `E_c` (001 eq. 1
 /// to 5, 10 and section 5).
 ///
-/// Least squares of distances of points from their profiles: both coordinates have errors. Intervals come from the covariance, by Student's t, on a logarithmic scale. If points have no
-/// doses, all were lit alike, and the critical dose stays unknown.
+/// Least squares of distances of points from their profiles: both coordinates have errors. Intervals
+/// come from the covariance, by Student's t, on a logarithmic scale. If points have no doses, all were
+/// lit alike, and the critical dose stays unknown.
 ///
 /// # Errors
 /// Returns an error if there are too few points, if no square is white, if nothing fits, or if the points
