@@ -23,6 +23,7 @@ mod defects;
 mod dither;
 mod edit;
 mod errors;
+mod features;
 mod field_files;
 mod fields;
 mod fix;
