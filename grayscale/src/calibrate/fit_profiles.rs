@@ -197,7 +197,15 @@ impl ProfileModel {
                 }
             }
         }
-        starts.sort_by(|a, b| a.squares(points).total_cmp(&b.squares(points)));
+        // The first step to the foot of each point orders them well enough.
+        let near = |start: &Self| {
+            let squares = points.iter().map(|point| {
+                let (excess, slope) = start.excess(point);
+                (excess / slope.hypot((-start.logs[1]).exp())).powi(2)
+            });
+            squares.sum::<f64>()
+        };
+        starts.sort_by(|a, b| near(a).total_cmp(&near(b)));
         starts.truncate(3);
         starts
     }
@@ -226,45 +234,55 @@ impl ProfileModel {
         (light - critical - depth.um() / fading, slope)
     }
 
-    /// Returns the distance of a point from its profile in um, inside above zero.
-    fn distance(&self, point: &ProfilePoint) -> f64 {
-        let (inside, _) = self.excess(point);
+    /// Returns the foot of a point on its profile, and its distance in um, inside above zero.
+    fn foot(&self, point: &ProfilePoint) -> (ProfilePoint, f64) {
         let fall = -(-self.logs[1]).exp();
-        // The foot of the point: each step goes to where the profile would be if it were straight.
         let mut away = [0.0; 2];
         let mut foot = *point;
-        for _ in 0..FOOT_STEPS {
+        let mut inside = 0.0;
+        // Each step goes to where the profile would be if it were straight.
+        for step in 0..FOOT_STEPS {
             let (excess, slope) = self.excess(&foot);
+            if step == 0 {
+                inside = excess;
+            }
             let along = (excess - slope * away[0] - fall * away[1]) / (slope * slope + fall * fall);
             away = [-slope * along, -fall * along];
             foot.place = Length::from_um(point.place.um() + away[0]);
             foot.depth = Length::from_um(point.depth.um() + away[1]);
         }
-        away[0].hypot(away[1]).copysign(inside)
+        (foot, away[0].hypot(away[1]).copysign(inside))
     }
 
     fn squares(&self, points: &[ProfilePoint]) -> f64 {
-        let sum: f64 = points.iter().map(|point| self.distance(point).powi(2)).sum();
+        let sum: f64 = points.iter().map(|point| self.foot(point).1.powi(2)).sum();
         if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
-    /// Returns the normal equations, by central differences. Numbers that are not fitted have a one.
+    /// Returns the normal equations. Numbers that are not fitted have a one.
+    ///
+    /// A number moves a profile at the foot of a point by the slope of the light's logarithm over the
+    /// number, divided by its gradient over the place.
     fn normal(&self, points: &[ProfilePoint]) -> ([[f64; NUMBERS]; NUMBERS], [f64; NUMBERS]) {
         const STEP: f64 = 1e-5;
-        let moved = |of: usize, by: f64| {
+        let [less, more] = [-STEP, STEP].map(|by| {
             let mut other = *self;
-            other.logs[of] += by;
+            other.logs[0] += by;
             other
-        };
-        let fitted = if self.grays { NUMBERS } else { NUMBERS - 1 };
+        });
+        let fall = (-self.logs[1]).exp();
         let (mut matrix, mut vector) = ([[0.0; NUMBERS]; NUMBERS], [0.0; NUMBERS]);
         for point in points {
-            let distance = self.distance(point);
-            let mut slopes = [0.0; NUMBERS];
-            for (of, slope) in slopes.iter_mut().enumerate().take(fitted) {
-                let [less, more] = [-STEP, STEP].map(|by| moved(of, by).distance(point));
-                *slope = (more - less) / (2.0 * STEP);
-            }
+            let (foot, distance) = self.foot(point);
+            let gradient = self.excess(&foot).1.hypot(fall);
+            let of_gray = self.logs[GAMMA].exp() * foot.gray.get().ln();
+            let slopes = [
+                (more.excess(&foot).0 - less.excess(&foot).0) / (2.0 * STEP),
+                foot.depth.um() * fall,
+                -1.0,
+                if self.grays { of_gray } else { 0.0 },
+            ]
+            .map(|slope| slope / gradient);
             for i in 0..NUMBERS {
                 vector[i] -= slopes[i] * distance;
                 for j in 0..NUMBERS {
@@ -477,7 +495,7 @@ mod tests {
                     let depth = 125.0 * model.excess(&flat).0;
                     nearest = nearest.min((at.um() - place.um()).hypot(depth - off.depth.um()));
                 }
-                let found = model.distance(&off).abs();
+                let found = model.foot(&off).1.abs();
                 assert!((found - nearest).abs() < 0.05, "{off:?}: {found} for {nearest}");
             }
         }
