@@ -213,20 +213,24 @@ fn the_state_of_a_plant_shows_in_its_first_print() {
 }
 
 #[test]
-fn a_plan_for_another_plant_is_as_good_as_the_plan_for_it_after_two_prints() {
+fn a_plan_for_another_plant_becomes_as_good_as_the_plan_for_it() {
     let (square, light) = (square_prism(0), pegda(100.0));
-    let real = Plant { depth: 0.8, dose: 0.85, spread: 1.3, drift: 0.02 };
-    let mut deviates = noise(3);
-    let start = planned(&square, light);
-    let prints = learned_prints(&square, light, real, &start, 3, |job, _, _, print| {
-        counted(job, print, &mut deviates)
-    });
-    let known = real.light(&light, 2);
-    let of_square = part(&square);
-    let simulation = Simulation::new(&of_square, &known, 1 << 30).unwrap();
-    let [best] = simulation.tally([&planned(&square, known)]);
-    let (learned, best) = (prints[2].wrong().sum() as f64, best.wrong().sum() as f64);
-    assert!(learned <= 1.2 * best, "{learned} {best}");
+    // Of the second plant's state, a single spread of five of the first lattice had nearly all
+    // weight.
+    let far = Plant { depth: 0.8, dose: 0.85, spread: 1.3, drift: 0.02 };
+    for (real, seed) in [(far, 3), (plant_of(4, 0.02), 4)] {
+        let mut deviates = noise(seed);
+        let start = planned(&square, light);
+        let prints = learned_prints(&square, light, real, &start, 2, |job, _, _, print| {
+            counted(job, print, &mut deviates)
+        });
+        let known = real.light(&light, 1);
+        let of_square = part(&square);
+        let simulation = Simulation::new(&of_square, &known, 1 << 30).unwrap();
+        let [best] = simulation.tally([&planned(&square, known)]);
+        let (learned, best) = (prints[1].wrong().sum() as f64, best.wrong().sum() as f64);
+        assert!(learned <= 1.2 * best, "{learned} {best}");
+    }
 }
 
 /// Light that spreads over half a pixel: counts have coarse steps.
@@ -372,7 +376,8 @@ fn courses(voxels: &Voxels, light: Light, plants: usize, drift: f64) -> Vec<Cour
     let plan = planned(voxels, light);
     let single = vec![plan.iter().sum::<f64>() / plan.len() as f64; plan.len()];
     let mut all = Vec::new();
-    for number in 0..plants {
+    let first = number_of("LAMP_FIRST", 0.0) as usize;
+    for number in first..first + plants {
         let real = plant_of(number as u64, drift);
         for start in [&single, &plan] {
             let course = course_of(&part, light, real, start, number as u64);

@@ -480,7 +480,8 @@ impl Fit<'_, '_> {
                 (WIDTH_SDS * covariance[DOSE][DOSE].sqrt()).clamp(LEAST_WIDTH, MOST[DOSE]);
             let step = half_width / DOSES as f64;
             let grid = DoseGrid { middle: mean[DOSE], step, half: DOSES };
-            let tried = self.lattice(&mean, &covariance, &grid)?;
+            let lattice = Lattice::of(&mean, &covariance);
+            let tried = self.tried(&lattice, &grid)?;
             let least = |of: fn(&SquaresByDose) -> &[f64]| {
                 let of_tried = |tried: &Tried| {
                     let of_print = |print| of(print).iter().copied().fold(f64::INFINITY, f64::min);
@@ -506,6 +507,7 @@ impl Fit<'_, '_> {
                 .map(|((tried, weight), (_, doses))| Member { pair: tried.pair, weight, doses })
                 .collect();
             (mean, covariance) = moments_of(&members, &grid);
+            lattice.add_cells(&mut covariance);
             let count = 1.0 / members.iter().map(|member| member.weight.powi(2)).sum::<f64>();
             if share == 1.0 && count >= ENOUGH || round == MOST_ROUNDS {
                 let misfit = least(|print| &print.loose).sqrt();
@@ -516,30 +518,13 @@ impl Fit<'_, '_> {
         }
     }
 
-    /// Returns a lattice of spreads and depths, with the sums of squares at all doses.
-    fn lattice(
-        &mut self,
-        mean: &[f64; NUMBERS],
-        covariance: &[[f64; NUMBERS]; NUMBERS],
-        grid: &DoseGrid,
-    ) -> Result<Vec<Tried>, PartError> {
-        // The root's first column alone changes the spread: light of columns is computed for each.
-        let spread_sd = (covariance[SPREAD][SPREAD] + LEAST_VARIANCE).sqrt();
-        let along = covariance[DEPTH][SPREAD] / spread_sd;
-        let across = (covariance[DEPTH][DEPTH] - along * along).max(0.0) + LEAST_VARIANCE;
+    /// Returns the sums of squares at all doses of the states of a lattice.
+    fn tried(&mut self, lattice: &Lattice, grid: &DoseGrid) -> Result<Vec<Tried>, PartError> {
         let mut all = Vec::new();
-        for spread in SPREADS {
-            for depth in DEPTHS {
-                let depth = mean[DEPTH] + along * spread + across.sqrt() * depth;
-                let spread = mean[SPREAD] + spread_sd * spread;
-                let pair = [
-                    depth.clamp(-MOST[DEPTH], MOST[DEPTH]),
-                    spread.clamp(-MOST[SPREAD], MOST[SPREAD]),
-                ];
-                let squares = |print| self.model.squares_by_dose(pair, print, grid);
-                let prints = self.prints.iter().map(squares).collect::<Result<_, PartError>>()?;
-                all.push(Tried { pair, prints });
-            }
+        for pair in lattice.pairs() {
+            let squares = |print| self.model.squares_by_dose(pair, print, grid);
+            let prints = self.prints.iter().map(squares).collect::<Result<_, PartError>>()?;
+            all.push(Tried { pair, prints });
         }
         Ok(all)
     }
@@ -735,9 +720,62 @@ fn weights_of(logs: &[f64]) -> (Vec<f64>, f64) {
     (at(low), low)
 }
 
-/// The lattice of states around the mean, in standard deviations.
-const SPREADS: [f64; 5] = [0.0, -1.2, 1.2, -2.4, 2.4];
-const DEPTHS: [f64; 7] = [-2.4, -1.6, -0.8, 0.0, 0.8, 1.6, 2.4];
+/// A lattice of spreads and depths around a mean: the steps of both.
+struct Lattice {
+    mean: [f64; 2],
+    /// The step of the spread, and how far the depth changes with it.
+    spread_step: f64,
+    along_step: f64,
+    depth_step: f64,
+}
+
+/// The steps of a lattice to each side of its mean, and their length in standard deviations.
+const SPREAD_STEPS: i32 = 2;
+const SPREAD_STEP_SDS: f64 = 1.2;
+const DEPTH_STEPS: i32 = 3;
+const DEPTH_STEP_SDS: f64 = 0.8;
+/// The least variance of a direction in which states are tried.
+const LEAST_VARIANCE: f64 = 1e-8;
+
+impl Lattice {
+    /// The root's first column alone changes the spread: light of columns is computed for each.
+    fn of(mean: &[f64; NUMBERS], covariance: &[[f64; NUMBERS]; NUMBERS]) -> Self {
+        let spread_sd = (covariance[SPREAD][SPREAD] + LEAST_VARIANCE).sqrt();
+        let along = covariance[DEPTH][SPREAD] / spread_sd;
+        let across = (covariance[DEPTH][DEPTH] - along * along).max(0.0) + LEAST_VARIANCE;
+        Self {
+            mean: [mean[DEPTH], mean[SPREAD]],
+            spread_step: SPREAD_STEP_SDS * spread_sd,
+            along_step: SPREAD_STEP_SDS * along,
+            depth_step: DEPTH_STEP_SDS * across.sqrt(),
+        }
+    }
+
+    /// Returns the depths and spreads.
+    fn pairs(&self) -> impl Iterator<Item = [f64; 2]> {
+        (-SPREAD_STEPS..=SPREAD_STEPS).flat_map(move |spread| {
+            (-DEPTH_STEPS..=DEPTH_STEPS).map(move |depth| {
+                let [spread, depth] = [spread, depth].map(f64::from);
+                let along = self.along_step * spread + self.depth_step * depth;
+                [
+                    (self.mean[0] + along).clamp(-MOST[DEPTH], MOST[DEPTH]),
+                    (self.mean[1] + self.spread_step * spread).clamp(-MOST[SPREAD], MOST[SPREAD]),
+                ]
+            })
+        })
+    }
+
+    /// Adds what lies between the states to their covariance: each stands for all within half a step.
+    /// Without that, states of one spread alone may look probable, and the next lattice is as narrow.
+    fn add_cells(&self, covariance: &mut [[f64; NUMBERS]; NUMBERS]) {
+        covariance[SPREAD][SPREAD] += self.spread_step.powi(2) / 12.0;
+        covariance[DEPTH][DEPTH] += (self.along_step.powi(2) + self.depth_step.powi(2)) / 12.0;
+        let both = self.spread_step * self.along_step / 12.0;
+        covariance[DEPTH][SPREAD] += both;
+        covariance[SPREAD][DEPTH] += both;
+    }
+}
+
 /// The doses on each side of the mean.
 const DOSES: usize = 150;
 /// The distance from the mean to the last of them, in standard deviations.
@@ -746,8 +784,6 @@ const WIDTH_SDS: f64 = 6.0;
 const LEAST_WIDTH: f64 = 0.1;
 /// The most lattices, each around the states of the last one.
 const MOST_ROUNDS: usize = 8;
-/// The least variance of a direction in which states are tried.
-const LEAST_VARIANCE: f64 = 1e-8;
 /// Weights are evened out until this many states of a lattice count. If as many count as `ENOUGH`
 /// without that, the lattice is close enough: of states as far apart as its covariance says, 13 do.
 const LEAST_COUNT: f64 = 4.0;
