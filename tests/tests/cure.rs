@@ -233,16 +233,17 @@ fn an_answer_has_the_areas_of_the_table() {
         let printed = scratch.run(&format!("{cure} {part} --json")).succeeds().stdout;
         assert_eq!(scratch.bytes("areas.json"), printed);
         let answer: Value = serde_json::from_slice(&printed).unwrap();
+        let section = &answer["section"];
         let head = format!(
             "y = {:.3} mm (row {}), z {:.3} to {:.3} mm, cured as lamp-suspension, {}",
-            answer["at_mm"].as_f64().unwrap(),
-            answer["row"],
-            answer["z_mm"][0].as_f64().unwrap(),
-            answer["z_mm"][1].as_f64().unwrap(),
+            section["at_mm"].as_f64().unwrap(),
+            section["row"],
+            section["z_mm"][0].as_f64().unwrap(),
+            section["z_mm"][1].as_f64().unwrap(),
             answer["rule"].as_str().unwrap(),
         );
         assert!(text.starts_with(&head), "{text}: {head}");
-        let areas = answer["areas"].as_array().unwrap();
+        let areas = section["areas"].as_array().unwrap();
         let lines = text.lines().skip(if part.is_empty() { 1 } else { 2 });
         assert_eq!(areas.len(), lines.clone().count(), "{text}");
         for (area, line) in areas.iter().zip(lines) {
@@ -257,6 +258,52 @@ fn an_answer_has_the_areas_of_the_table() {
     let line = format!("{cure} --report s.png.json --report gray.tif");
     scratch.run(&line).is_wrong_usage(&["--report"]);
     scratch.run(&format!("{cure} --report part.stl")).is_wrong_usage(&["part.stl"]);
+}
+
+/// A cube of 10 mm, and a box of it: the layers above cure some of the space below it.
+#[test]
+fn places_have_the_sizes_that_their_file_names() {
+    let scratch = Scratch::new();
+    scratch.run("lamp sample cube -o cube.stl").succeeds();
+    scratch.run("slice cube.stl --dpi 254 --material lamp-suspension -o cube.tif").succeeds();
+    let layers = scratch.layers("cube.tif");
+    let top_um = layers.len() as f64 * layers[0].info.thickness_um.unwrap();
+    let places = format!(
+        "[[place]]\nname = 'wall'\nx = '5.05mm'\nz = '5.05mm'\nwanted = '10mm'\nmeasured = '10.1mm'\n\
+         [[place]]\nname = 'height'\nx = '5.05mm'\ny = '5.05mm'\nz = ['0mm', '20mm']\n\
+         [[place]]\nname = 'corner'\nx = ['0mm', '1mm']\ny = ['0mm', '2mm']\nz = ['0mm', '3mm']"
+    );
+    scratch.write("places.toml", places.as_bytes());
+    let cure = "lamp cure cube.tif --material lamp-suspension --places places.toml";
+    let printed = scratch.run(&format!("{cure} --json")).succeeds().stdout;
+    let answer: Value = serde_json::from_slice(&printed).unwrap();
+    assert_eq!(answer["section"], Value::Null);
+    let sizes = [("um", 10_000.0), ("um", top_um), ("mm3", 6.0)];
+    for (place, (unit, size)) in answer["places"].as_array().unwrap().iter().zip(sizes) {
+        assert_eq!(place["unit"], unit);
+        assert!((place["white"].as_f64().unwrap() - size).abs() < 1e-6, "{place}");
+        assert_eq!(place["gray"], Value::Null);
+    }
+    assert_eq!(
+        (&answer["places"][0]["wanted"], &answer["places"][0]["measured"]),
+        (&10_000.0.into(), &10_100.0.into())
+    );
+    let text = String::from_utf8(scratch.run(cure).succeeds().stdout).unwrap();
+    let rows: Vec<Vec<_>> = text
+        .lines()
+        .map(|line| line.split("  ").map(str::trim).filter(|it| !it.is_empty()).collect())
+        .collect();
+    assert_eq!(rows[2], ["wall", "10000.0 um", "10000.0 um", "-", "10100.0 um"]);
+    assert_eq!(rows[4], ["corner", "-", "6.0000 mm3", "-", "-"]);
+    // With a section, both are printed.
+    let both = scratch.run(&format!("{cure} --section y=5mm -o s.png")).succeeds().stdout;
+    assert!(String::from_utf8(both).unwrap().ends_with(&text));
+    scratch.run("lamp cure cube.tif --material lamp-suspension").is_wrong_usage(&["--section"]);
+    scratch.run(&format!("{cure} -o s.png")).is_wrong_usage(&["--section"]);
+    scratch.write("places.toml", b"[[place]]\nname = 'p'\nx = '1mm'");
+    scratch.run(cure).is_refused_with(&["places.toml", "the place p is neither a line nor a box"]);
+    scratch.write("places.toml", b"[[place]]\nname = 'p'\nx = '40mm'\ny = '5mm'");
+    scratch.run(cure).is_refused_with(&["cube.tif", "the place p", "outside its images"]);
 }
 
 /// An upright wall cuts pixels, and those whose centers it holds are wholly cured at best.

@@ -1,7 +1,7 @@
-//! Why a stack has no section.
+//! Why a stack has no section, and why a file names no places.
 
 use lamp_grayscale::resin::CureError;
-use lamp_stack::LengthError;
+use lamp_stack::{LengthError, TomlError};
 use thiserror::Error;
 
 use super::line::SectionPlane;
@@ -59,4 +59,46 @@ pub enum CureSectionError {
         /// Why white does not cure just the layer.
         problem: CureError,
     },
+    /// A place has no section.
+    #[error("the place {name}: {problem}")]
+    Place {
+        /// Its name.
+        name: String,
+        /// Why not.
+        problem: Box<CureSectionError>,
+    },
+}
+
+/// Why a file names no places.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PlacesError {
+    /// The text is not TOML, or a key is unknown, missing or wrong.
+    #[error("line {}: {}", .0.line, .0.problem)]
+    Toml(TomlError),
+    /// Two places have one name.
+    #[error("two places have the name {0}")]
+    Twice(String),
+    /// A place is a point or a plane.
+    #[error(
+        "the place {0} is neither a line nor a box: give two of x, y and z as lengths for a line along \
+         the third, and none for a box"
+    )]
+    Shape(String),
+    /// A stated size cannot be read.
+    #[error("the place {name}: {key}: {problem}")]
+    Size {
+        /// The place's name.
+        name: String,
+        /// The key: `wanted` or `measured`.
+        key: &'static str,
+        /// The fault.
+        problem: String,
+    },
+}
+
+impl From<TomlError> for PlacesError {
+    fn from(error: TomlError) -> Self {
+        Self::Toml(error)
+    }
 }

@@ -86,6 +86,27 @@ impl SectionLine {
         Ok(Self { line, corner_mm, pitch, pixels })
     }
 
+    /// Returns the planes of the rows of pixels whose centers lie within a range of y in millimeters.
+    ///
+    /// # Errors
+    /// Returns an error if the layer does not state its position or resolution.
+    pub(super) fn rows_within(
+        y_mm: &Range<f64>,
+        layer: &Layer,
+    ) -> Result<Vec<SectionPlane>, CureSectionError> {
+        let corner_mm = layer.info.origin_mm.ok_or(CureSectionError::NoPosition)?;
+        let pitch = layer.pitch.ok_or(CureSectionError::NoResolution)?;
+        let column =
+            Self { line: PixelLine::Column(0), corner_mm, pitch, pixels: layer.image.height() };
+        let plane = |row| Self { line: PixelLine::Row(row), ..column }.plane();
+        Ok(column.within(y_mm).map(plane).collect())
+    }
+
+    /// Returns the pixel of a row at an x that lies in its images.
+    pub(super) fn pixel_at(&self, x: Length) -> u32 {
+        ((x.mm() - self.corner_mm[0]) / self.pixel_mm()) as u32
+    }
+
     /// Returns the resolution along the line.
     pub fn along(&self) -> Dpi {
         match self.line {
