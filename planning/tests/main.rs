@@ -2,6 +2,7 @@
 
 mod appendix_a;
 mod column_cure;
+mod column_learn;
 mod parts_of_001;
 mod referee;
 mod rows_of_003;

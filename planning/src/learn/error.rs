@@ -9,6 +9,7 @@ use lamp_stack::CatalogueError;
 use thiserror::Error;
 
 use super::heights::FaceError;
+use crate::column::NoHeights;
 use crate::resin_light::NoLight;
 use crate::speed::{PartError, PlatformError, SpeedPlanError};
 
@@ -263,4 +264,7 @@ pub enum LearnError {
     /// There is no plan for the corrected doses.
     #[error(transparent)]
     Plan(#[from] SpeedPlanError),
+    /// The material does not state how deep a dose cures.
+    #[error(transparent)]
+    Curve(#[from] NoHeights),
 }

@@ -101,6 +101,14 @@ fn read_text(file: &Path, max: u64, what: &'static str) -> Result<String, JobFil
         .map_err(|error| JobFileError::NotText(error.utf8_error().valid_up_to()))
 }
 
+/// Reads a text of a job that was sealed when it was written. `what` names such texts.
+///
+/// # Errors
+/// Returns an error if it cannot be read, or was changed.
+pub fn sealed_text(file: &Path, what: &'static str) -> Result<String, JobError> {
+    read_sealed(file, MAX_TABLE, what).map_err(at(file))
+}
+
 /// Reads a text that was sealed when it was written.
 fn read_sealed(file: &Path, max: u64, what: &'static str) -> Result<String, JobFileError> {
     let text = read_text(file, max, what)?;
@@ -296,7 +304,7 @@ impl Job {
     /// Returns the earlier print whose measurements were the same, word for word.
     pub fn print_measured_as(&self, text: &str) -> Option<usize> {
         let same = |print: &JobPrint| {
-            print.measured.as_ref().is_some_and(|(_, known)| is_same(known, text))
+            print.measured.as_ref().is_some_and(|(_, known)| is_same_table(known, text))
         };
         self.prints.iter().position(same)
     }
@@ -339,7 +347,7 @@ impl Job {
     pub fn take_back(&mut self, text: &str) -> Option<usize> {
         let print = self.prints.len().checked_sub(2)?;
         let (_, known) = self.prints[print].measured.as_ref()?;
-        if !is_same(known, text) {
+        if !is_same_table(known, text) {
             return None;
         }
         self.prints.truncate(print + 1);
@@ -401,11 +409,12 @@ fn read_material(file: &Path) -> Result<Material, JobError> {
 }
 
 /// Returns true if two tables are the same, except for blank lines at the end.
-fn is_same(a: &str, b: &str) -> bool {
+pub fn is_same_table(a: &str, b: &str) -> bool {
     a.trim_end() == b.trim_end()
 }
 
-fn measured_name(print: usize) -> String {
+/// Returns the name of the file that has the measurements of a print.
+pub fn measured_name(print: usize) -> String {
     format!("print-{print:03}-measured.csv")
 }
 

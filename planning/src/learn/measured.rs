@@ -1,6 +1,6 @@
 //! Reads the measurements of a print.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lamp_grayscale::calibrate::{CsvTable, NumberRow};
 
@@ -35,6 +35,14 @@ pub struct HeightRow {
     pub measured_mm: f64,
     /// The standard deviation of the measurement.
     pub sd_um: f64,
+}
+
+impl HeightRow {
+    /// Returns the place and the height of the face, for comparisons: 0 and -0 are the same.
+    fn place(&self) -> [u64; 3] {
+        let [x, y] = self.place_mm;
+        [x, y, self.z_mm].map(|number| (number + 0.0).to_bits())
+    }
 }
 
 /// A layer's wrongly cured pixels.
@@ -79,10 +87,10 @@ impl PrintMeasurements {
                 layers(own) == layers(other)
             }
             (Self::Heights(own), Self::Heights(other)) => {
-                let is_in = |row: &HeightRow, all: &[HeightRow]| {
-                    all.iter().any(|it| it.place_mm == row.place_mm && it.z_mm == row.z_mm)
+                let places = |rows: &[HeightRow]| -> HashSet<[u64; 3]> {
+                    rows.iter().map(HeightRow::place).collect()
                 };
-                own.len() == other.len() && own.iter().all(|row| is_in(row, other))
+                own.len() == other.len() && places(own) == places(other)
             }
             _ => false,
         }
@@ -140,7 +148,7 @@ impl PrintMeasurements {
     }
 
     fn heights(table: &CsvTable) -> Result<Self, MeasuredError> {
-        let mut rows: Vec<HeightRow> = Vec::new();
+        let (mut rows, mut known) = (Vec::new(), HashMap::new());
         for NumberRow { line, numbers: [x, y, z, measured, sd] } in table.numbers(&HEIGHTS, 4)? {
             let number = |number: Option<f64>| number.unwrap_or_default();
             let sd_um = sd.unwrap_or(USUAL_SD_UM);
@@ -154,10 +162,7 @@ impl PrintMeasurements {
                 measured_mm: number(measured),
                 sd_um,
             };
-            let same =
-                |other: &&HeightRow| other.place_mm == row.place_mm && other.z_mm == row.z_mm;
-            if let Some(first) = rows.iter().find(same) {
-                let first = first.line;
+            if let Some(first) = known.insert(row.place(), line) {
                 return Err(MeasuredError::SamePlace { line, first });
             }
             rows.push(row);

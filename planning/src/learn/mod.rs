@@ -4,9 +4,11 @@
 //! - [`Law`] turns the wrong voxels of each layer into changes of its time.
 //! - [`Response`] is the model's effect of a change of times on the wrong voxels.
 //! - [`convergence`] checks whether a law's changes shrink the errors of the next prints.
+//! - [`Columns`] finds the same state from the heights of columns that bitmaps cure.
 //! - A [`Job`] keeps a stack and all its prints in a folder; [`learn`] turns the
 //!   [`PrintMeasurements`] of the last print into the times of the next.
 
+mod columns;
 mod convergence;
 mod error;
 mod heights;
@@ -17,10 +19,14 @@ mod response;
 mod state;
 mod step;
 
+pub use columns::{ColumnFit, ColumnLight, Columns, GlassChange};
 pub use convergence::{Convergence, convergence, largest_safe_gain};
 pub use error::{JobError, JobFileError, LearnError, MeasuredError};
 pub use heights::{FaceError, face_at, height_of};
-pub use job::{Job, JobFile, JobPrint, digest_of_stack, profile_name};
+pub use job::{
+    Job, JobFile, JobPrint, digest_of_stack, is_same_table, measured_name, profile_name,
+    sealed_text,
+};
 pub use law::{Law, MultiLaw, SHORTEST, errors_of};
 pub use measured::{AreaRow, HeightRow, PrintError, PrintMeasurements};
 pub use response::Response;

@@ -22,15 +22,15 @@ use crate::speed::{DoseGrid, PartError, Simulation, TimedPart};
 
 /// The standard deviations of the numbers of a material that states no interval, as logarithms: how
 /// far resins and lamps usually are from a table.
-const UNSTATED: [f64; NUMBERS] = [0.25, 0.3, 0.3];
+pub(super) const UNSTATED: [f64; NUMBERS] = [0.25, 0.3, 0.3];
 /// No number is known better than this before it is printed with: an interval is of the day when it
 /// was measured.
 const BEST_STATED: f64 = 0.05;
 /// The numbers of a state: penetration depth, dose, spread.
-const NUMBERS: usize = 3;
-const DEPTH: usize = 0;
-const DOSE: usize = 1;
-const SPREAD: usize = 2;
+pub(super) const NUMBERS: usize = 3;
+pub(super) const DEPTH: usize = 0;
+pub(super) const DOSE: usize = 1;
+pub(super) const SPREAD: usize = 2;
 /// The standard deviation of the change of the dose from print to print: lamps age and resins tire.
 const DRIFT: f64 = 0.02;
 /// The standard deviation of a counted area, as a share of it.
@@ -40,7 +40,7 @@ const EDGE_PX: f64 = 0.289;
 /// The same where each voxel of the model is cured or not: prints are not as sharp as their model.
 const SHARP_EDGE_PX: f64 = 0.005;
 /// States are searched within these factors of the material's numbers, as logarithms.
-const MOST: [f64; NUMBERS] = [1.2, 1.5, 1.2];
+pub(super) const MOST: [f64; NUMBERS] = [1.2, 1.5, 1.2];
 
 /// A number of the state, as a factor of the material's number.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -94,7 +94,7 @@ impl LightState {
         Self::new(&[0.0; NUMBERS], covariance)
     }
 
-    fn new(logs: &[f64], covariance: [[f64; NUMBERS]; NUMBERS]) -> Self {
+    pub(super) fn new(logs: &[f64], covariance: [[f64; NUMBERS]; NUMBERS]) -> Self {
         let factor = |k: usize| Factor { value: logs[k].exp(), sd: covariance[k][k].sqrt() };
         Self {
             penetration_depth: factor(DEPTH),
@@ -109,7 +109,12 @@ impl LightState {
         [self.penetration_depth, self.dose, self.spread]
     }
 
-    fn logs(&self) -> [f64; NUMBERS] {
+    /// Returns the covariance of the three logarithms.
+    pub(super) fn covariance(&self) -> &[[f64; NUMBERS]; NUMBERS] {
+        &self.covariance
+    }
+
+    pub(super) fn logs(&self) -> [f64; NUMBERS] {
         self.factors().map(|factor| factor.value.ln())
     }
 
@@ -133,7 +138,7 @@ impl LightState {
 }
 
 /// Returns the standard deviation of a number's logarithm, if its file states an interval.
-fn stated_sd<T: Quantity>(given: &Given<T>) -> Option<f64> {
+pub(super) fn stated_sd<T: Quantity>(given: &Given<T>) -> Option<f64> {
     // An interval of 95 % reaches 1.96 standard deviations to each side.
     let half = given.plus_minus.as_ref()?.number();
     Some((half / (1.96 * given.value.number())).max(BEST_STATED))

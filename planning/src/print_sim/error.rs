@@ -3,6 +3,7 @@
 use lamp_stack::Length;
 use thiserror::Error;
 
+use crate::column::NoHeights;
 use crate::light::LightError;
 use crate::resin_light::NoLight;
 use crate::speed::PartError;
@@ -43,6 +44,9 @@ pub enum PrintSimError {
     /// The model cannot expose the part.
     #[error(transparent)]
     Part(#[from] PartError),
+    /// The material does not state how deep a dose cures.
+    #[error(transparent)]
+    Curve(#[from] NoHeights),
     /// The stack's pages do not state their position on the part.
     #[error(
         "the stack's pages do not state their position on the part: begin a job with a stack whose \

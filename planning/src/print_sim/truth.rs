@@ -95,7 +95,7 @@ impl<T> Default for TrueNumber<T> {
 
 impl<T: Quantity> TrueNumber<T> {
     /// Returns the number that is true, given the material's.
-    fn of(self, material: T) -> T {
+    pub(super) fn of(self, material: T) -> T {
         match self {
             Self::Changed(change) => T::of(material.number() * change.factor()),
             Self::Value(value) => value,

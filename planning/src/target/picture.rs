@@ -3,8 +3,9 @@
 use std::io::{BufRead, Seek};
 
 use lamp_stack::Length;
+use png::{BitDepth, ColorType, Encoder, EncodingError};
 
-use super::{GrayPicture, TargetError};
+use super::{GrayPicture, HeightMap, TargetError};
 
 /// The scale of the pixels of a height map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,13 +61,39 @@ impl HeightPicture {
     }
 }
 
+impl HeightMap {
+    /// Returns the map as a PNG of 16 bits, and its scale. [`Target::open`](super::Target::open)
+    /// reads it.
+    ///
+    /// # Errors
+    /// Returns an error if the map is empty, or larger than a PNG can be.
+    pub fn to_png(&self) -> Result<(Vec<u8>, MapScale), EncodingError> {
+        let highest_um = self.highest_um();
+        let full_um = if highest_um > 0.0 { highest_um } else { 1.0 };
+        let most = f64::from(u16::MAX);
+        let level =
+            |um: &f64| ((um / full_um * most).round().clamp(0.0, most) as u16).to_be_bytes();
+        let levels: Vec<u8> = self.heights_um.iter().flat_map(level).collect();
+        let [columns, rows] =
+            [self.grid.columns, self.grid.rows].map(|count| u32::try_from(count).unwrap_or(0));
+        let mut bytes = Vec::new();
+        let mut encoder = Encoder::new(&mut bytes, columns, rows);
+        encoder.set_color(ColorType::Grayscale);
+        encoder.set_depth(BitDepth::Sixteen);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&levels)?;
+        writer.finish()?;
+        let (pixel, full) = (Length::from_um(self.grid.pitch_um), Length::from_um(full_um));
+        Ok((bytes, MapScale { pixel, full }))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::io::Cursor;
 
-    use png::{BitDepth, ColorType};
-
     use super::*;
+    use crate::target::Grid;
 
     const SCALE: MapScale = MapScale { pixel: Length::from_um(10.0), full: Length::from_um(500.0) };
 
@@ -98,6 +125,21 @@ mod tests {
         );
         let map = read(&png(1, 1, ColorType::Grayscale, BitDepth::Eight, &[51])).unwrap();
         assert_eq!(map.height_um(0.0, 0.0), 100.0);
+    }
+
+    #[test]
+    fn a_written_map_reads_back() {
+        let grid = Grid { columns: 3, rows: 2, pitch_um: 10.0 };
+        let heights_um = vec![0.0, 20.0, 400.0, 123.456, 1e-3, 399.9];
+        let map = HeightMap { grid, heights_um };
+        let (bytes, scale) = map.to_png().unwrap();
+        let read = HeightPicture::read("map", Cursor::new(&bytes), scale).unwrap();
+        for (at, um) in map.heights_um.iter().enumerate() {
+            let found = read.height_um(grid.x_um(at % 3), grid.y_um(at / 3));
+            // Half a level.
+            assert!((found - um).abs() <= 400.0 / 65535.0 / 2.0 + 1e-9, "{at}: {found}");
+        }
+        assert_eq!(read.height_um(10.0, 5.0), 400.0);
     }
 
     #[test]
