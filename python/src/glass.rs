@@ -22,7 +22,7 @@ pub(crate) fn plan_column_cure<'py>(keywords: &Bound<'py, PyDict>) -> PyResult<B
     let py = keywords.py();
     let settings: ColumnCureSettings = settings(py, &given(keywords)?, |_, _| Ok(()))?;
     check_given(py, &settings.projector, &settings.material)?;
-    planned(py, move |watcher| Ok(settings.plan(watcher)?.glass_plan()))
+    planned(py, move |watcher| settings.plan(watcher)?.glass_plan())
 }
 
 /// Chooses bitmaps and times that cure a round part, by the kinetics of resin and oxygen.

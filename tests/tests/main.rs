@@ -39,6 +39,7 @@ mod json;
 mod late_disks;
 mod launchers;
 mod learn;
+mod learn_columns;
 mod licences;
 mod machine;
 mod material;

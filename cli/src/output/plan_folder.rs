@@ -33,6 +33,9 @@ pub(crate) fn write_plan(folder: PlanFolder, plan: &GlassPlan) -> Result<(), Exi
     if let Some(target) = &plan.wanted {
         folder.add(RESIDUAL, &heat_map(&residual(plan, target))?)?;
     }
+    for (name, bytes) in &plan.inputs {
+        folder.add(name, bytes)?;
+    }
     folder.add(TIMES, &heat_map(&times(plan))?)?;
     Ok(folder.finish()?)
 }

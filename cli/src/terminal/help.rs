@@ -100,7 +100,20 @@ const USUAL: [(&str, &[&str]); 14] = [
     ),
     (
         "learn",
-        &["start", "material", "measured", "print", "law", "gain", "report", "plot", "output"],
+        &[
+            "start",
+            "material",
+            "projector",
+            "measured",
+            "pixel",
+            "full",
+            "print",
+            "law",
+            "gain",
+            "report",
+            "plot",
+            "output",
+        ],
     ),
     (
         "compensate",

@@ -1,7 +1,7 @@
 //! The settings of column cure, and the plan that they ask for.
 
 use std::fmt;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -13,7 +13,7 @@ use lamp_planning::column::{
     ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Setup, Stop, Tracing, plan,
 };
 use lamp_planning::projector::Projector;
-use lamp_planning::target::{GrayPicture, HeightMap};
+use lamp_planning::target::{GrayPicture, Grid, HeightMap};
 use lamp_stack::{Length, quoted};
 use serde::{Deserialize, Serialize};
 
@@ -169,6 +169,41 @@ pub struct ColumnCure {
     pub curve: HeightCurve,
     /// The bitmaps, their times and doses.
     pub plan: ColumnPlan,
+    /// Files from which the plan can be made again.
+    pub inputs: PlanInputs,
+}
+
+/// The files of a plan's folder from which the plan can be made again.
+#[derive(Clone, Debug)]
+pub struct PlanInputs {
+    /// The settings, with the names of the other files.
+    pub settings: ColumnCureSettings,
+    /// The target's heights, as a PNG.
+    pub target: Vec<u8>,
+    /// The light of each mirror, as a PNG.
+    pub flat_field: Option<Vec<u8>>,
+}
+
+impl PlanInputs {
+    /// The name of the settings.
+    pub const SETTINGS: &'static str = "plan.toml";
+    /// The name of the target.
+    pub const TARGET: &'static str = "target.png";
+    /// The name of the flat field.
+    pub const FLAT_FIELD: &'static str = "flat-field.png";
+
+    /// Returns the files, by their names.
+    ///
+    /// # Errors
+    /// Returns an error if a path of the settings is not text.
+    pub fn files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
+        let settings = toml::to_string(&self.settings).map_err(of_work)?;
+        let flat_field = self.flat_field.clone().map(|bytes| (Self::FLAT_FIELD, bytes));
+        Ok([(Self::SETTINGS, settings.into_bytes()), (Self::TARGET, self.target.clone())]
+            .into_iter()
+            .chain(flat_field)
+            .collect())
+    }
 }
 
 impl ColumnCureSettings {
@@ -178,8 +213,21 @@ impl ColumnCureSettings {
     /// Returns an error if the target, projector, resin or flat field cannot be read, if settings
     /// contradict them, or if there is no plan.
     pub fn plan(&self, watcher: &dyn Watcher) -> Result<ColumnCure, Error> {
-        let (projector, projector_word) = document_and_word::<Projector>(&self.projector)?;
-        let (material, material_word) = document_and_word::<Material>(&self.material)?;
+        let projector = document_and_word::<Projector>(&self.projector)?;
+        let material = document_and_word::<Material>(&self.material)?;
+        self.plan_for(projector, material, watcher)
+    }
+
+    /// Plans the bitmaps for a projector and a material, each with its word for the command.
+    ///
+    /// # Errors
+    /// As [`plan`](Self::plan).
+    pub fn plan_for(
+        &self,
+        (projector, projector_word): (Projector, String),
+        (material, material_word): (Material, String),
+        watcher: &dyn Watcher,
+    ) -> Result<ColumnCure, Error> {
         let curve = HeightCurve::of(&material).map_err(of_work)?;
         let target = self.target.open(&projector, watcher)?;
         let (wanted, light) = self.light(&projector, &target)?;
@@ -192,6 +240,7 @@ impl ColumnCureSettings {
         let cure = ColumnCure {
             target: target.name().to_owned(),
             command: self.command(target.name(), &projector_word, &material_word, &options),
+            inputs: self.inputs(&target, &projector, &wanted)?,
             material: material.name,
             projector,
             options,
@@ -227,6 +276,32 @@ impl ColumnCureSettings {
             setup.flat_field = flat.map_err(|error| error.at(path.display().to_string()))?;
         }
         Ok((wanted, GlassLight::new(setup)))
+    }
+
+    /// Returns the files from which the plan can be made again.
+    fn inputs(
+        &self,
+        target: &GivenTarget,
+        projector: &Projector,
+        wanted: &HeightMap,
+    ) -> Result<PlanInputs, Error> {
+        let voxel = Length::from_um(wanted.grid.pitch_um);
+        // The room for light around the target depends on the projector.
+        let heights = target.heights(&Grid::over(target.size(), voxel), projector)?;
+        let (png, scale) = heights.to_png().map_err(of_work)?;
+        let settings = Self {
+            target: TargetSettings {
+                target: PlanInputs::TARGET.into(),
+                pixel: Some(scale.pixel),
+                full: Some(scale.full),
+                ..TargetSettings::default()
+            },
+            voxel: Some(voxel),
+            flat_field: self.flat_field.as_ref().map(|_| PlanInputs::FLAT_FIELD.into()),
+            ..self.clone()
+        };
+        let flat_field = self.flat_field.as_ref().map(fs::read).transpose()?;
+        Ok(PlanInputs { settings, target: png, flat_field })
     }
 
     fn options(
@@ -329,14 +404,17 @@ impl ColumnCureSettings {
 
 impl ColumnCure {
     /// Returns the bitmaps with their report, and what they cure.
-    pub fn glass_plan(&self) -> GlassPlan {
+    ///
+    /// # Errors
+    /// Returns an error if a path of the settings is not text.
+    pub fn glass_plan(&self) -> Result<GlassPlan, Error> {
         let step_ms = self.projector.step.value.ms();
         let bitmaps = self.plan.bitmaps.iter().map(|bitmap| ShownBitmap {
             image: bitmap.image.clone(),
             time: ExposureTime::from_ms(step_ms * bitmap.steps as f64),
         });
         let heights_um = self.plan.doses.iter().map(|&dose| self.curve.height_um(dose)).collect();
-        GlassPlan {
+        Ok(GlassPlan {
             part: self.target.clone(),
             command: self.command.clone(),
             pitch: self.projector.pitch.value,
@@ -344,7 +422,8 @@ impl ColumnCure {
             report: json_of(&report_of(self)),
             cured: HeightMap { grid: self.wanted.grid, heights_um },
             wanted: Some(self.wanted.clone()),
-        }
+            inputs: self.inputs.files()?,
+        })
     }
 
     /// Returns what is doubtful about the times.
@@ -365,7 +444,7 @@ impl ColumnCure {
 }
 
 /// Reads the light of the mirrors that a setup uses.
-fn flat_field(path: &Path, setup: &Setup) -> Result<Vec<f64>, Error> {
+pub(super) fn flat_field(path: &Path, setup: &Setup) -> Result<Vec<f64>, Error> {
     let file = File::open(path)?;
     let picture = GrayPicture::read(BufReader::new(file)).map_err(of_work)?;
     let [columns, rows] = setup.display;

@@ -134,6 +134,7 @@ impl RingCure {
             report: json_of(&report),
             wanted: Some(grid.round(|radius_um| round.height_um(radius_um))),
             cured: plan.cured.on(&grid),
+            inputs: Vec::new(),
         }
     }
 }

@@ -2,6 +2,7 @@
 //! by kinetics (003).
 
 mod column_cure;
+mod column_job;
 mod column_measures;
 mod column_report;
 mod ecpl;
@@ -14,7 +15,10 @@ use lamp_stack::Length;
 use serde::Serialize;
 use serde_json::Value;
 
-pub use column_cure::{BitmapCount, ColumnCure, ColumnCureSettings, LongestTime, SearchGap};
+pub use column_cure::{
+    BitmapCount, ColumnCure, ColumnCureSettings, LongestTime, PlanInputs, SearchGap,
+};
+pub use column_job::{ColumnJob, ColumnJobPrint, ColumnLesson, is_column_job};
 pub use column_measures::{MeasuresReport, measures_line, measures_report, unmeasured_heights};
 pub use column_report::ColumnCureReport;
 pub use ecpl::{EcplReport, EcplSettings, RingCure, kinetic_setting, map_grid};
@@ -38,6 +42,8 @@ pub struct GlassPlan {
     pub wanted: Option<HeightMap>,
     /// The cured heights, on the same columns.
     pub cured: HeightMap,
+    /// Files from which the plan can be made again, by their names.
+    pub inputs: Vec<(&'static str, Vec<u8>)>,
 }
 
 impl GlassPlan {

@@ -1,7 +1,7 @@
 //! The state of light and resin that the heights of cured columns show (000 figure 6.4: measure the
 //! part, correct the plan).
 //!
-//! The numbers are those of [`LightState`]. The most probable state has the least sum of squares, of
+//! The state is a [`LightState`]. The most probable state has the least sum of squares, of
 //! the heights' residuals and of its own distance from projector and material, each in standard
 //! deviations (Gauss and Newton, with Levenberg's and Marquardt's damping: Nocedal and Wright 2006,
 //! section 10.3). Its covariance is the inverse of the sum's curvature.

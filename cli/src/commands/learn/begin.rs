@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 use lamp_grayscale::resin::ExposureTime;
 use lamp_pipeline::documents::document;
+use lamp_pipeline::glass::is_column_job;
 use lamp_planning::Light;
 use lamp_planning::learn::{JobFile, digest_of_stack, profile_name};
 use lamp_planning::speed::{PartPages, times_table};
@@ -114,6 +115,11 @@ fn new_folder_of(folder: &Path) -> Result<FolderBeside, Exit> {
 /// Returns the reason why a job cannot be begun a second time.
 fn refuse_second(folder: &Path, stack: &Path, digest: &str) -> Result<Exit, Exit> {
     let (folder, stack) = (folder.to_owned(), input_name(stack));
+    if is_column_job(&folder) {
+        let folder = folder.display();
+        let error = anyhow!("{folder} is the job of a plan of column cure: name another folder");
+        return Ok(Exit::Failed(error));
+    }
     let there = JobFile::read(&folder)?;
     let error = if there.digest == digest {
         anyhow!("{} is the job of {stack} already: leave out --start", folder.display())

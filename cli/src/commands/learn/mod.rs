@@ -1,6 +1,7 @@
-//! `lamp learn`: corrects the times of layers after every print.
+//! `lamp learn`: corrects the times of layers, or bitmaps, after every print.
 
 mod begin;
+mod columns;
 mod plot;
 mod report;
 
@@ -10,13 +11,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
+use lamp_pipeline::glass::is_column_job;
 use lamp_pipeline::memory;
-use lamp_planning::SampleHeight;
 use lamp_planning::learn::{Job, Law, Method, PrintMeasurements, learn};
 use lamp_planning::speed::{Platform, Speed};
+use lamp_planning::{PlanFolder, SampleHeight};
+use lamp_stack::Length;
 
 use crate::args::lamp_option::LampOption;
-use crate::args::options::{Common, one_of_described, parse_memory};
+use crate::args::options::{Common, one_of_described, parse_memory, parse_thickness};
 use crate::args::planning_options::{SAMPLE_HEIGHTS, parse_margin};
 use crate::args::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
 use crate::catalogue::read_text;
@@ -31,35 +34,51 @@ use report::{lines_of, write_report};
 /// Measurements are read whole.
 const MAX_TABLE: u64 = 64 << 20;
 
-/// Correct layer times after every print, from measurements
+/// Correct layer times or bitmaps after every print, from measurements
 ///
 /// A job is a folder that keeps a stack, its material, and the times and measurements of all
 /// prints. Begin a job with a stack that has exposure times, print it, and give your measurements:
 /// the heights of downward faces, or the wrongly cured pixels of each layer. The command finds the
 /// state of light and resin that all prints show, plans the times again for that state, and writes
 /// them for the next print.
+///
+/// A job can also begin with the folder of lamp plan column-cure. Its measurements are the heights
+/// of columns, as a table or as a height map, and the next print is another such folder.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp learn job/ --start timed.tif --material mine.toml
   lamp learn job/ --measured heights.csv -o next.csv
-  lamp learn job/ --measured areas.csv --law single --gain 6e-6 --plot learn.svg -o next.csv")]
+  lamp learn job/ --measured areas.csv --law single --gain 6e-6 --plot learn.svg -o next.csv
+  lamp learn job/ --start plan/ --material mine.toml --projector zhao
+  lamp learn job/ --measured map.png --pixel 10um --full 500um -o next/")]
 pub(crate) struct LearnArgs {
     /// Folder of the job
     #[arg(value_name = "JOB")]
     job: PathBuf,
 
-    /// Begin the job with this stack, whose pages state the exposures of print 0
-    #[arg(long, value_name = "STACK", conflicts_with = "measured")]
+    /// Begin the job with this stack, whose pages state the exposures of print 0, or with the folder
+    /// of a plan of column cure
+    #[arg(long, value_name = "STACK|PLAN", conflicts_with = "measured")]
     start: Option<PathBuf>,
 
     #[command(flatten)]
     kept: KeptOptions,
 
     /// Measurements of a print: x_mm, y_mm, z_mm, measured_mm and sd_um, or layer, over_px and
-    /// under_px
-    #[arg(long, value_name = "FILE.csv", requires = "output")]
+    /// under_px; of a plan of column cure also a PNG height map
+    #[arg(long, value_name = "FILE", requires = "output")]
     measured: Option<PathBuf>,
+
+    /// Side of a measured height map's pixels on the glass
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    #[arg(requires_all = ["full", "measured"])]
+    pixel: Option<Length>,
+
+    /// Height of a measured height map's full white
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    #[arg(requires_all = ["pixel", "measured"])]
+    full: Option<Length>,
 
     /// The print that was measured: 0 is the first [default: the last]
     #[arg(long, value_name = "N", requires = "measured")]
@@ -73,8 +92,8 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "S/PX", value_parser = parse_gain, requires = "law")]
     gain: Option<f64>,
 
-    /// Write the layers' times for the next print
-    #[arg(short, long, value_name = "NEXT.csv", requires = "measured", value_parser = parse_table)]
+    /// Write the layers' times for the next print, or the folder of its bitmaps
+    #[arg(short, long, value_name = "NEXT", requires = "measured")]
     output: Option<PathBuf>,
 
     #[command(flatten)]
@@ -96,6 +115,11 @@ struct KeptOptions {
     /// Resin: a built-in material's name (see lamp material list) or a file
     #[arg(long, value_name = "MATERIAL", requires = "start")]
     material: Option<PathBuf>,
+
+    /// Projector of a plan of column cure: a built-in projector's name (see lamp projector list) or
+    /// a file
+    #[arg(long, value_name = "PROJECTOR", requires = "start")]
+    projector: Option<PathBuf>,
 
     #[command(flatten)]
     lamp: LampOption,
@@ -123,6 +147,16 @@ struct KeptOptions {
 }
 
 impl KeptOptions {
+    /// Returns true if an option is given that only stacks have.
+    fn is_of_stacks(&self) -> bool {
+        self.lamp.light().is_some()
+            || self.wanted.is_some()
+            || self.dose_at.is_some()
+            || self.dose_margin.is_some()
+            || self.speed.is_some()
+            || self.max_change.is_some()
+    }
+
     fn platform(&self) -> Platform {
         let (slowest, fastest) = self.speed.unwrap_or(DEFAULT_SPEEDS);
         Platform { slowest, fastest, max_change: self.max_change }
@@ -158,6 +192,16 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
         let Some(material) = &args.kept.material else {
             return Err(Exit::usage("--start needs the resin: give --material MATERIAL"));
         };
+        // A folder of pages is a stack, too.
+        if stack.join(PlanFolder::BITMAPS).exists() {
+            return columns::begin(args, stack, material, &progress);
+        }
+        if args.kept.projector.is_some() {
+            return Err(Exit::usage(format!(
+                "--projector is for the folder of a plan of column cure: {} is another input",
+                input_name(stack)
+            )));
+        }
         return begin::begin(&args.job, stack, material, &args.kept, &progress);
     }
     let (Some(measured), Some(output)) = (&args.measured, &args.output) else {
@@ -165,6 +209,13 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
             "begin a job with --start STACK --material M, or give what was --measured",
         ));
     };
+    if is_column_job(&args.job) {
+        return columns::run(args, measured, output, &progress);
+    }
+    if args.pixel.is_some() {
+        return Err(Exit::usage("--pixel and --full are for jobs of column cure: leave them out"));
+    }
+    parse_table(&output.to_string_lossy()).map_err(Exit::usage)?;
     if is_stream(output) {
         return Err(Exit::usage("name a file for the next profile, such as -o next.csv"));
     }

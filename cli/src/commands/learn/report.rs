@@ -4,7 +4,9 @@ use std::path::Path;
 
 use lamp_pipeline::heights::{significant, time_text};
 use lamp_pipeline::ranges;
-use lamp_planning::learn::{Job, JobPrint, Learned, Lesson, LightState, PrintError, StateLesson};
+use lamp_planning::learn::{
+    Factor, Job, JobPrint, Learned, Lesson, LightState, PrintError, StateLesson, Unseparated,
+};
 use serde::Serialize;
 
 use crate::exit::Exit;
@@ -52,21 +54,26 @@ pub(super) fn lines_of(job: &Job, print: usize, learned: &Learned) -> String {
 }
 
 /// A print is worse than the best one if it has more than this multiple of its errors: less is noise.
-const WORSE: f64 = 1.2;
+pub(super) const WORSE: f64 = 1.2;
 
 /// Measurements farther from a state, in standard deviations, are not explained by it.
-const MISFIT: f64 = 3.0;
+pub(super) const MISFIT: f64 = 3.0;
+
+/// The line of a number of a state.
+pub(super) fn state_line(name: &str, after: Factor, before: Factor) -> String {
+    let [now, was] = [after, before].map(|factor| {
+        let [low, high] = factor.interval().map(significant);
+        format!("{} ({low} to {high})", significant(factor.value))
+    });
+    format!("{name}: {now} times the material's; before this print {was}\n")
+}
 
 /// The lines of a state.
 fn state_lines(print: usize, lesson: &StateLesson) -> String {
     let mut text = String::new();
     let states = lesson.after.factors().into_iter().zip(lesson.before.factors());
     for (name, (after, before)) in LightState::NAMES.iter().zip(states) {
-        let [now, was] = [after, before].map(|factor| {
-            let [low, high] = factor.interval().map(significant);
-            format!("{} ({low} to {high})", significant(factor.value))
-        });
-        text += &format!("{name}: {now} times the material's; before this print {was}\n");
+        text += &state_line(name, after, before);
     }
     if lesson.misfit > MISFIT {
         text += &format!(
@@ -142,7 +149,7 @@ struct Expected {
 /// A number of light and resin, as a factor of the material's.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-struct StateLine {
+pub(super) struct StateLine {
     /// Its name.
     number: &'static str,
     /// The mean factor, of its logarithm over the probable states.
@@ -158,7 +165,7 @@ struct StateLine {
 /// Two numbers that the measurements do not separate.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-struct UnseparatedLine {
+pub(super) struct UnseparatedLine {
     /// Their names.
     numbers: [&'static str; 2],
     /// The correlation of their logarithms.
@@ -180,7 +187,7 @@ struct ConvergenceLine {
 /// A print.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-struct PrintLine {
+pub(super) struct PrintLine {
     /// Its number, from 0.
     print: usize,
     /// Sum of its exposure times, in seconds.
@@ -238,30 +245,17 @@ pub(super) fn write_report(
         safe_gain,
         exposure_s: learned.times.iter().sum(),
     };
-    let states = state.map(|lesson| {
-        let factors = lesson.after.factors().into_iter().zip(lesson.before.factors());
-        LightState::NAMES.into_iter().zip(factors).map(|(number, (after, before))| StateLine {
-            number,
-            value: after.value,
-            interval: after.interval(),
-            before: before.value,
-            interval_before: before.interval(),
-        })
-    });
-    let unseparated = state.map(|lesson| lesson.after.unseparated()).unwrap_or_default();
-    let unseparated = unseparated
-        .into_iter()
-        .map(|pair| UnseparatedLine { numbers: pair.names, correlation: pair.correlation });
+    let states = state.map(|lesson| StateLine::all(&lesson.after, &lesson.before));
+    let unseparated = state.map(|lesson| UnseparatedLine::all(&lesson.after));
     let decay = decay.iter().map(|(share, decay)| ConvergenceLine {
         depth: *share,
         radius: decay.radius,
         norm: decay.norm,
     });
-    let prints = job.prints.iter().enumerate().map(|(number, print)| PrintLine {
-        print: number,
-        exposure_s: print.times.iter().sum(),
-        error: error_of(print).map(ErrorOfPrint::from),
-    });
+    let prints =
+        job.prints.iter().enumerate().map(|(number, print)| {
+            PrintLine::new(number, print.times.iter().sum(), error_of(print))
+        });
     // Layers are counted from the light down, and reports go upward.
     let layers = job.part.layers().iter().enumerate().rev().map(|(at, layer)| LearnedLayer {
         layer: layer.index,
@@ -271,17 +265,45 @@ pub(super) fn write_report(
     });
     JsonReport::of_schema("lamp-learn-1", &head)
         .list("state", states.into_iter().flatten())
-        .list("unseparated", unseparated)
+        .list("unseparated", unseparated.into_iter().flatten())
         .list("convergence", decay)
         .list("prints", prints)
         .list("by_layer", layers)
         .write(path)
 }
 
+impl StateLine {
+    /// Returns the numbers of a state, and of the state before.
+    pub(super) fn all(after: &LightState, before: &LightState) -> impl Iterator<Item = Self> {
+        let factors = after.factors().into_iter().zip(before.factors());
+        LightState::NAMES.into_iter().zip(factors).map(|(number, (after, before))| Self {
+            number,
+            value: after.value,
+            interval: after.interval(),
+            before: before.value,
+            interval_before: before.interval(),
+        })
+    }
+}
+
+impl UnseparatedLine {
+    /// Returns the pairs of a state.
+    pub(super) fn all(state: &LightState) -> impl Iterator<Item = Self> {
+        let line = |pair: Unseparated| Self { numbers: pair.names, correlation: pair.correlation };
+        state.unseparated().into_iter().map(line)
+    }
+}
+
+impl PrintLine {
+    pub(super) fn new(print: usize, exposure_s: f64, error: Option<PrintError>) -> Self {
+        Self { print, exposure_s, error: error.map(ErrorOfPrint::from) }
+    }
+}
+
 /// The error of a print.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-enum ErrorOfPrint {
+pub(super) enum ErrorOfPrint {
     /// Wrong pixels of all layers.
     #[serde(rename = "wrong_px")]
     Pixels(f64),

@@ -95,7 +95,7 @@ pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
     let folder = plan_folder(&args.output, args.force)?;
     let progress = Progress::new("plan", common, true);
     let cure = args.settings().plan(&progress)?;
-    write_plan(folder, &cure.glass_plan())?;
+    write_plan(folder, &cure.glass_plan()?)?;
     progress.wrote(&args.output, &[]);
     cure.lines().iter().for_each(|line| progress.say(line));
     Ok(())

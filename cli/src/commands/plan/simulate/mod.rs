@@ -249,6 +249,7 @@ fn write(
         report,
         wanted: outcome.wanted,
         cured: outcome.cured,
+        inputs: Vec::new(),
     };
     write_plan(folder, &plan)
 }

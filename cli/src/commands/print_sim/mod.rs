@@ -1,11 +1,14 @@
 //! `lamp print-sim`: prints a job on a simulated machine, and measures the print.
 
+mod columns;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_pipeline::documents::{document, is_file, own_file};
+use lamp_pipeline::glass::is_column_job;
 use lamp_pipeline::heights::significant;
 use lamp_pipeline::memory;
 use lamp_planning::learn::{PrintError, PrintMeasurements};
@@ -13,9 +16,9 @@ use lamp_planning::print_sim::{PrintSimError, SimulatedPrint, Truth};
 use lamp_stack::Length;
 use serde::Serialize;
 
-use super::learn::{check_outside_job, open};
 use crate::args::options::{Common, Output, parse_count};
 use crate::catalogue::read_text;
+use crate::commands::learn::{check_outside_job, open};
 use crate::exit::Exit;
 use crate::output::endings::parse_table;
 use crate::output::json_report::{print_answer, schemas};
@@ -39,6 +42,9 @@ const MOST_PLACES: usize = 10_000;
 /// --measured reads: the wrong pixels of each layer, or with --heights the heights of faces that
 /// look down. So the whole loop of printing and learning runs without a machine.
 ///
+/// A job of column cure is measured by the heights of its columns: of all, or with --heights of that
+/// many random ones.
+///
 /// A truth is a TOML file. Each key is a change, such as "+25%", or a value: penetration-depth,
 /// critical-dose, light, spread; drift is the change of the light from print to print. Left out
 /// keys are as in the job's material, or as in another one that the key material names.
@@ -47,7 +53,8 @@ const MOST_PLACES: usize = 10_000;
 Examples:
   lamp print-sim job/ --truth plant.toml --noise 2% -o measured.csv
   lamp print-sim job/ --truth plant.toml --heights 1000 --noise 2um -o heights.csv
-  lamp print-sim job/ --body printed.tif -o measured.csv")]
+  lamp print-sim job/ --body printed.tif -o measured.csv
+  lamp print-sim columns/ --truth plant.toml --noise 1um -o heights.csv")]
 pub(crate) struct PrintSimArgs {
     /// Folder of the job
     #[arg(value_name = "JOB")]
@@ -61,12 +68,13 @@ pub(crate) struct PrintSimArgs {
     #[arg(long, value_name = "N")]
     print: Option<usize>,
 
-    /// Measure heights at this many random places of faces that look down, instead of wrong pixels
+    /// Measure heights at this many random places of faces that look down, instead of wrong pixels;
+    /// with column cure at this many random columns, instead of all
     #[arg(long, value_name = "N", value_parser = parse_places)]
     heights: Option<usize>,
 
     /// Standard deviation of the measurements: of counts a share of each, such as 2%, of heights a
-    /// length, such as 2um [default: 0% of counts, 20um of heights]
+    /// length, such as 2um [default: 0% of counts, 20um of heights, 1um of columns]
     #[arg(long, value_name = "NOISE", value_parser = parse_noise)]
     noise: Option<Noise>,
 
@@ -144,12 +152,15 @@ pub(crate) fn run(args: &PrintSimArgs, common: &Common) -> Result<(), Exit> {
         Some(path) => (read_truth(path)?, input_name(path)),
         None => (Truth::default(), input_name(&args.job)),
     };
+    let material = truth.material.as_deref().map(|word| document(&args.beside_truth(word)));
+    let material: Option<Material> = material.transpose()?;
+    if is_column_job(&args.job) {
+        return columns::run(args, &truth, truth_name, material, &progress);
+    }
+    args.check_noise()?;
     let job = open(&args.job, &progress)?;
     let number = job.print_of(args.print)?;
-    let material = match &truth.material {
-        Some(word) => document(&args.beside_truth(word))?,
-        None => job.material.clone(),
-    };
+    let material = material.unwrap_or_else(|| job.material.clone());
     let memory = memory::available() / 4;
     let failed = |error: PrintSimError| Exit::Failed(error.into());
     let simulated = SimulatedPrint::new(&job, number, &material, &truth, memory)
@@ -176,21 +187,6 @@ pub(crate) fn run(args: &PrintSimArgs, common: &Common) -> Result<(), Exit> {
 impl PrintSimArgs {
     /// Checks the options, and the names of outputs, before the work.
     fn check_outputs(&self) -> Result<(), Exit> {
-        match (self.noise, self.heights) {
-            (Some(Noise::Length(_)), None) => {
-                return Err(Exit::usage(
-                    "counts of pixels have a share as their --noise, such as 2%; a length is for \
-                     --heights",
-                ));
-            }
-            (Some(Noise::Share(_)), Some(_)) => {
-                return Err(Exit::usage(
-                    "heights have a length as their --noise, such as 2um; a share is for counts of \
-                     pixels",
-                ));
-            }
-            _ => {}
-        }
         if self.json && is_stream(&self.output) {
             return Err(Exit::usage(
                 "standard output cannot take both the table and its JSON: name a file with -o",
@@ -211,6 +207,21 @@ impl PrintSimArgs {
             return Err(Exit::usage("name a TIFF file for the body, such as --body printed.tif"));
         }
         check_beside(&self.output, body, &self.truth)
+    }
+
+    /// Checks that the noise is of the kind that is measured.
+    fn check_noise(&self) -> Result<(), Exit> {
+        match (self.noise, self.heights) {
+            (Some(Noise::Length(_)), None) => Err(Exit::usage(
+                "counts of pixels have a share as their --noise, such as 2%; a length is for \
+                     --heights",
+            )),
+            (Some(Noise::Share(_)), Some(_)) => Err(Exit::usage(
+                "heights have a length as their --noise, such as 2um; a share is for counts of \
+                     pixels",
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// Returns where the truth's material is: a name as it is, a file beside the truth's.
