@@ -25,7 +25,7 @@ use lamp_planning::learn::{
 use lamp_planning::projector::Projector;
 use lamp_planning::target::{Grid, HeightMap, MapScale, Target, TargetOptions};
 use lamp_planning::{MirrorSeconds, ShownBitmap};
-use lamp_stack::{Catalogued, Length, sealed};
+use lamp_stack::{Catalogued, Length, Page, sealed};
 use serde::{Deserialize, Serialize};
 
 use super::column_cure::{ColumnCure, ColumnCureSettings, PlanInputs, flat_field};
@@ -247,7 +247,7 @@ impl ColumnJob {
         let mut bitmaps: Vec<ShownBitmap> = Vec::new();
         let display = &self.columns.projector.display;
         for page in open_stack(path)? {
-            let layer = page.and_then(|page| page.decode()).map_err(|error| named(error.into()))?;
+            let layer = page.and_then(Page::decode).map_err(|error| named(error.into()))?;
             let time = ExposureTime::from_ms(layer.info.exposure_ms.unwrap_or_default());
             let image = layer.image.into_image();
             if [image.width(), image.height()] != [display.columns, display.rows] {
@@ -454,7 +454,7 @@ fn part_of(bitmaps: &Path) -> Result<String, Error> {
     let named = |error: Error| error.at(bitmaps.display().to_string());
     match open_stack(bitmaps)?.next() {
         Some(page) => {
-            let layer = page.and_then(|page| page.decode()).map_err(|error| named(error.into()))?;
+            let layer = page.and_then(Page::decode).map_err(|error| named(error.into()))?;
             Ok(layer.info.stack.map(|stack| stack.part).unwrap_or_default())
         }
         None => Err(named(Error::work("there are no bitmaps"))),
