@@ -260,50 +260,61 @@ fn an_answer_has_the_areas_of_the_table() {
     scratch.run(&format!("{cure} --report part.stl")).is_wrong_usage(&["part.stl"]);
 }
 
-/// A cube of 10 mm, and a box of it: the layers above cure some of the space below it.
+/// A block of 3.013 x 0.7 x 2 mm in pixels of 0.1 mm.
 #[test]
 fn places_have_the_sizes_that_their_file_names() {
     let scratch = Scratch::new();
-    scratch.run("lamp sample cube -o cube.stl").succeeds();
-    scratch.run("slice cube.stl --dpi 254 --material lamp-suspension -o cube.tif").succeeds();
-    let layers = scratch.layers("cube.tif");
-    let top_um = layers.len() as f64 * layers[0].info.thickness_um.unwrap();
-    let places = format!(
-        "[[place]]\nname = 'wall'\nx = '5.05mm'\nz = '5.05mm'\nwanted = '10mm'\nmeasured = '10.1mm'\n\
-         [[place]]\nname = 'height'\nx = '5.05mm'\ny = '5.05mm'\nz = ['0mm', '20mm']\n\
-         [[place]]\nname = 'corner'\nx = ['0mm', '1mm']\ny = ['0mm', '2mm']\nz = ['0mm', '3mm']"
-    );
+    scratch.mesh("block.stl", &prism(0.0));
+    scratch.run("slice block.stl --dpi 254 --material lamp-suspension -o block.tif").succeeds();
+    let places = "[[place]]
+        name = 'width'
+        y = '0.35mm'
+        z = '1.05mm'
+        wanted = '3.013mm'
+        measured = '3.1mm'
+        [[place]]
+        name = 'height'
+        x = '1.55mm'
+        y = '0.35mm'
+        z = ['0mm', '9mm']
+        [[place]]
+        name = 'corner'
+        x = ['0mm', '1mm']
+        y = ['0mm', '0.5mm']
+        z = ['0mm', '1mm']";
     scratch.write("places.toml", places.as_bytes());
-    let cure = "lamp cure cube.tif --material lamp-suspension --places places.toml";
+    let cure = "lamp cure block.tif --material lamp-suspension --places places.toml";
     let printed = scratch.run(&format!("{cure} --json")).succeeds().stdout;
     let answer: Value = serde_json::from_slice(&printed).unwrap();
     assert_eq!(answer["section"], Value::Null);
-    let sizes = [("um", 10_000.0), ("um", top_um), ("mm3", 6.0)];
-    for (place, (unit, size)) in answer["places"].as_array().unwrap().iter().zip(sizes) {
+    let answers = answer["places"].as_array().unwrap();
+    let sizes = [("um", 3013.0, 100.0), ("um", 2000.0, 1e-6), ("mm3", 0.5, 0.151)];
+    for (place, (unit, size, off)) in answers.iter().zip(sizes) {
         assert_eq!(place["unit"], unit);
-        assert!((place["white"].as_f64().unwrap() - size).abs() < 1e-6, "{place}");
+        assert!((place["white"].as_f64().unwrap() - size).abs() < off, "{place}");
         assert_eq!(place["gray"], Value::Null);
     }
-    assert_eq!(
-        (&answer["places"][0]["wanted"], &answer["places"][0]["measured"]),
-        (&10_000.0.into(), &10_100.0.into())
-    );
+    assert_eq!(answers[0]["wanted"].as_f64(), Some(3013.0));
+    assert_eq!(answers[0]["measured"].as_f64(), Some(3100.0));
     let text = String::from_utf8(scratch.run(cure).succeeds().stdout).unwrap();
-    let rows: Vec<Vec<_>> = text
-        .lines()
-        .map(|line| line.split("  ").map(str::trim).filter(|it| !it.is_empty()).collect())
-        .collect();
-    assert_eq!(rows[2], ["wall", "10000.0 um", "10000.0 um", "-", "10100.0 um"]);
-    assert_eq!(rows[4], ["corner", "-", "6.0000 mm3", "-", "-"]);
+    let row = |number: usize| {
+        let cells = text.lines().nth(number).unwrap().split("  ").map(str::trim);
+        cells.filter(|cell| !cell.is_empty()).collect::<Vec<_>>()
+    };
+    assert_eq!(row(1), ["place", "wanted", "white", "gray", "measured"]);
+    assert_eq!(row(2)[..2], ["width", "3013.0 um"]);
+    assert_eq!(row(2)[3..], ["-", "3100.0 um"]);
+    assert_eq!(row(3), ["height", "-", "2000.0 um", "-", "-"]);
     // With a section, both are printed.
-    let both = scratch.run(&format!("{cure} --section y=5mm -o s.png")).succeeds().stdout;
+    let both = scratch.run(&format!("{cure} --section y=0.35mm -o s.png")).succeeds().stdout;
     assert!(String::from_utf8(both).unwrap().ends_with(&text));
-    scratch.run("lamp cure cube.tif --material lamp-suspension").is_wrong_usage(&["--section"]);
+    scratch.run("lamp cure block.tif --material lamp-suspension").is_wrong_usage(&["--section"]);
     scratch.run(&format!("{cure} -o s.png")).is_wrong_usage(&["--section"]);
     scratch.write("places.toml", b"[[place]]\nname = 'p'\nx = '1mm'");
-    scratch.run(cure).is_refused_with(&["places.toml", "the place p is neither a line nor a box"]);
+    let point = ["places.toml", "the place p is neither a line nor a box"];
+    scratch.run(cure).is_refused_with(&point);
     scratch.write("places.toml", b"[[place]]\nname = 'p'\nx = '40mm'\ny = '5mm'");
-    scratch.run(cure).is_refused_with(&["cube.tif", "the place p", "outside its images"]);
+    scratch.run(cure).is_refused_with(&["block.tif", "the place p", "outside its images"]);
 }
 
 /// An upright wall cuts pixels, and those whose centers it holds are wholly cured at best.

@@ -99,7 +99,7 @@ pub(crate) struct CureArgs {
 
     /// Scale of the picture: 4 draws each pixel 4 wide, 1/8 draws every eighth pixel; heights have the
     /// same scale
-    #[arg(long, value_name = "N|1/N", default_value = "1")]
+    #[arg(long, value_name = "N|1/N", default_value = "1", hide_short_help = true)]
     zoom: PictureScale,
 
     /// Picture to write: a file that ends in .png or .svg

@@ -86,7 +86,7 @@ impl SectionLine {
         Ok(Self { line, corner_mm, pitch, pixels })
     }
 
-    /// Returns the planes of the rows of pixels whose centers lie within a range of y in millimeters.
+    /// Returns the planes of the rows of pixels whose centers are in a range of y in millimeters.
     ///
     /// # Errors
     /// Returns an error if the layer does not state its position or resolution.

@@ -234,7 +234,8 @@ impl Place {
                     let [wide, high] = line.pitch.mm();
                     solids.map(|solid| within(solid, z)).sum::<f64>() * wide * high
                 };
-                PlaceSize::Volume(sections.iter().map(volume).sum())
+                // The sum of nothing is -0.
+                PlaceSize::Volume(sections.iter().map(volume).sum::<f64>() + 0.0)
             }
         }
     }

@@ -215,20 +215,20 @@ fn the_state_of_a_plant_shows_in_its_first_print() {
 #[test]
 fn a_plan_for_another_plant_becomes_as_good_as_the_plan_for_it() {
     let (square, light) = (square_prism(0), pegda(100.0));
-    // Of the second plant's state, a single spread of five of the first lattice had nearly all
-    // weight.
     let far = Plant { depth: 0.8, dose: 0.85, spread: 1.3, drift: 0.02 };
-    for (real, seed) in [(far, 3), (plant_of(4, 0.02), 4)] {
+    // Of the near plant's state, a single spread of five of the first lattice had nearly all weight.
+    let near = plant_of(4, 0.02);
+    for (real, seed, steps) in [(far, 3, 2), (near, 4, 1)] {
         let mut deviates = noise(seed);
         let start = planned(&square, light);
-        let prints = learned_prints(&square, light, real, &start, 2, |job, _, _, print| {
+        let prints = learned_prints(&square, light, real, &start, steps + 1, |job, _, _, print| {
             counted(job, print, &mut deviates)
         });
-        let known = real.light(&light, 1);
+        let known = real.light(&light, steps);
         let of_square = part(&square);
         let simulation = Simulation::new(&of_square, &known, 1 << 30).unwrap();
         let [best] = simulation.tally([&planned(&square, known)]);
-        let (learned, best) = (prints[1].wrong().sum() as f64, best.wrong().sum() as f64);
+        let (learned, best) = (prints[steps].wrong().sum() as f64, best.wrong().sum() as f64);
         assert!(learned <= 1.2 * best, "{learned} {best}");
     }
 }
@@ -298,8 +298,9 @@ fn heights_teach_the_state() {
         off.iter().zip(best).fold(0.0, |most: f64, (um, best)| most.max((um - best).abs()))
     };
     assert!(worst(&off[0]) > 300.0, "{off:?} {best:?}");
-    // A step keeps a reserve of dose against drift, 4 % or 44 um of depth at most.
-    assert!(worst(&off[2]) < 60.0 && worst(&off[3]) < 60.0, "{off:?} {best:?}");
+    // A step keeps a reserve of dose against drift, 4 % or 44 um of depth at most, and against what
+    // two prints leave unknown of the state.
+    assert!(worst(&off[2]) < 70.0 && worst(&off[3]) < 50.0, "{off:?} {best:?}");
 }
 
 /// A plant whose penetration depth is up to 30 % off, light and critical dose up to 20 %, spread -30
