@@ -288,7 +288,7 @@ fn places_have_the_sizes_that_their_file_names() {
     let answer: Value = serde_json::from_slice(&printed).unwrap();
     assert_eq!(answer["section"], Value::Null);
     let answers = answer["places"].as_array().unwrap();
-    let sizes = [("um", 3013.0, 100.0), ("um", 2000.0, 1e-6), ("mm3", 0.5, 0.151)];
+    let sizes = [("um", 3013.0, 100.0), ("um", 2000.0, 1e-3), ("mm3", 0.5, 0.151)];
     for (place, (unit, size, off)) in answers.iter().zip(sizes) {
         assert_eq!(place["unit"], unit);
         assert!((place["white"].as_f64().unwrap() - size).abs() < off, "{place}");
