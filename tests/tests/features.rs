@@ -8,7 +8,7 @@ use lamp_tests::workspace_root;
 /// Returns the crates that a choice of packages builds, each with its features.
 fn crates_of(chosen: &[&str]) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
-        .args(["tree", "--offline", "--prefix", "none", "--format", "{p} {f}"])
+        .args(["tree", "--locked", "--prefix", "none", "--format", "{p} {f}"])
         .args(chosen)
         .current_dir(workspace_root())
         .output()
