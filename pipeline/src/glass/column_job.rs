@@ -20,7 +20,7 @@ use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::column::Setup;
 use lamp_planning::learn::{
     ColumnFit, ColumnLight, Columns, HeightRow, JobError, JobFile, LightState, PrintMeasurements,
-    digest_of_stack, is_same_table, measured_name, sealed_text,
+    digest_of_stack, measured_name, print_to_learn_from, requested_print, sealed_text, take_back,
 };
 use lamp_planning::projector::Projector;
 use lamp_planning::target::{Grid, HeightMap, MapScale, Target, TargetOptions};
@@ -284,12 +284,7 @@ impl ColumnJob {
     /// # Errors
     /// Returns an error if it was never planned.
     pub fn print_of(&self, asked: Option<usize>) -> Result<usize, JobError> {
-        let last = self.prints.len() - 1;
-        let print = asked.unwrap_or(last);
-        match print > last {
-            true => Err(JobError::NotPlanned { folder: self.folder.clone(), print, last }),
-            false => Ok(print),
-        }
+        requested_print(&self.folder, self.prints.len(), asked)
     }
 
     /// Returns the print that was measured: the last one, unless another is requested.
@@ -297,24 +292,13 @@ impl ColumnJob {
     /// # Errors
     /// Returns an error if it is not the last.
     pub fn print_to_learn_from(&self, asked: Option<usize>) -> Result<usize, JobError> {
-        let (print, last) = (self.print_of(asked)?, self.prints.len() - 1);
-        match print < last {
-            true => Err(JobError::LearntFrom { folder: self.folder.clone(), print, last }),
-            false => Ok(print),
-        }
+        print_to_learn_from(&self.folder, self.prints.len(), asked)
     }
 
     /// Goes back to the state before the last print was learned from, if these are its
     /// measurements. Returns its number.
     pub fn take_back(&mut self, text: &str) -> Option<usize> {
-        let print = self.prints.len().checked_sub(2)?;
-        let (_, known) = self.prints[print].measured.as_ref()?;
-        if !is_same_table(known, text) {
-            return None;
-        }
-        self.prints.truncate(print + 1);
-        self.prints[print].measured = None;
-        Some(print)
+        take_back(&mut self.prints, text, |print| &mut print.measured)
     }
 
     /// Returns the measurements of a height map, a PNG: each of its pixels on the columns.

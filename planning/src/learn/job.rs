@@ -281,12 +281,7 @@ impl Job {
     /// # Errors
     /// Returns an error if it was never planned.
     pub fn print_of(&self, asked: Option<usize>) -> Result<usize, JobError> {
-        let last = self.prints.len() - 1;
-        let print = asked.unwrap_or(last);
-        match print > last {
-            true => Err(JobError::NotPlanned { folder: self.folder.clone(), print, last }),
-            false => Ok(print),
-        }
+        requested_print(&self.folder, self.prints.len(), asked)
     }
 
     /// Returns the print that was measured: the last one, unless another is requested.
@@ -294,11 +289,7 @@ impl Job {
     /// # Errors
     /// Returns an error if it is not the last.
     pub fn print_to_learn_from(&self, asked: Option<usize>) -> Result<usize, JobError> {
-        let (print, last) = (self.print_of(asked)?, self.prints.len() - 1);
-        match print < last {
-            true => Err(JobError::LearntFrom { folder: self.folder.clone(), print, last }),
-            false => Ok(print),
-        }
+        print_to_learn_from(&self.folder, self.prints.len(), asked)
     }
 
     /// Returns the earlier print whose measurements were the same, word for word.
@@ -345,14 +336,7 @@ impl Job {
     ///
     /// So a repeated call, after one that did not end, gives the same result.
     pub fn take_back(&mut self, text: &str) -> Option<usize> {
-        let print = self.prints.len().checked_sub(2)?;
-        let (_, known) = self.prints[print].measured.as_ref()?;
-        if !is_same_table(known, text) {
-            return None;
-        }
-        self.prints.truncate(print + 1);
-        self.prints[print].measured = None;
-        Some(print)
+        take_back(&mut self.prints, text, |print| &mut print.measured)
     }
 
     /// Checks that the repeated results for a print equal the earlier ones.
@@ -408,8 +392,59 @@ fn read_material(file: &Path) -> Result<Material, JobError> {
     read().map_err(at(file))
 }
 
+/// Returns the print of a job in a folder that is requested: the last one of `count`, if none is.
+///
+/// # Errors
+/// Returns an error if it was never planned.
+pub fn requested_print(
+    folder: &Path,
+    count: usize,
+    asked: Option<usize>,
+) -> Result<usize, JobError> {
+    let last = count - 1;
+    let print = asked.unwrap_or(last);
+    match print > last {
+        true => Err(JobError::NotPlanned { folder: folder.to_owned(), print, last }),
+        false => Ok(print),
+    }
+}
+
+/// Returns the print of a job in a folder that was measured: the last one of `count`, unless another is
+/// requested.
+///
+/// # Errors
+/// Returns an error if it is not the last.
+pub fn print_to_learn_from(
+    folder: &Path,
+    count: usize,
+    asked: Option<usize>,
+) -> Result<usize, JobError> {
+    let (print, last) = (requested_print(folder, count, asked)?, count - 1);
+    match print < last {
+        true => Err(JobError::LearntFrom { folder: folder.to_owned(), print, last }),
+        false => Ok(print),
+    }
+}
+
+/// Goes back to the prints before the last one was learned from, if these are its measurements. Returns
+/// its number.
+pub fn take_back<P>(
+    prints: &mut Vec<P>,
+    text: &str,
+    measured: impl Fn(&mut P) -> &mut Option<(PrintMeasurements, String)>,
+) -> Option<usize> {
+    let print = prints.len().checked_sub(2)?;
+    let of_print = measured(&mut prints[print]);
+    if !is_same_table(&of_print.as_ref()?.1, text) {
+        return None;
+    }
+    *of_print = None;
+    prints.truncate(print + 1);
+    Some(print)
+}
+
 /// Returns true if two tables are the same, except for blank lines at the end.
-pub fn is_same_table(a: &str, b: &str) -> bool {
+fn is_same_table(a: &str, b: &str) -> bool {
     a.trim_end() == b.trim_end()
 }
 

@@ -24,8 +24,8 @@ pub use convergence::{Convergence, convergence, largest_safe_gain};
 pub use error::{JobError, JobFileError, LearnError, MeasuredError};
 pub use heights::{FaceError, face_at, height_of};
 pub use job::{
-    Job, JobFile, JobPrint, digest_of_stack, is_same_table, measured_name, profile_name,
-    sealed_text,
+    Job, JobFile, JobPrint, digest_of_stack, measured_name, print_to_learn_from, profile_name,
+    requested_print, sealed_text, take_back,
 };
 pub use law::{Law, MultiLaw, SHORTEST, errors_of};
 pub use measured::{AreaRow, HeightRow, PrintError, PrintMeasurements};
