@@ -7,7 +7,10 @@ use lamp_planning::voxels::{
     LayerOutcome, Options, Outcome, Sources, VoxelObjective, VoxelPlanError, Window, plan,
 };
 use lamp_planning::{Blur, IntensityOf, LayerLight, Light, SampleHeight};
-use lamp_stack::Length;
+use lamp_stack::{Layer, Length};
+
+/// 001's exponent of the light over the gray level (section 5).
+const GAMMA: f64 = 2.404;
 
 /// A part and its light. Layers count from the light.
 struct Case {
@@ -26,6 +29,21 @@ impl Case {
         let mut doses = case.doses(&case.white());
         doses.sort_by(f64::total_cmp);
         Self { critical: doses[doses.len() - HELIX_CURED], ..case }
+    }
+
+    /// White light makes the notch this thick.
+    fn with_notch(um: f64) -> Self {
+        let case = Self { critical: 1.0, ..Self::helix() };
+        let doses = case.doses(&case.white());
+        // The higher the critical dose, the thinner the notch.
+        let [mut low, mut high] = [0.01, doses.iter().copied().fold(0.0, f64::max)];
+        for _ in 0..50 {
+            let critical = 0.5 * (low + high);
+            let scaled: Vec<_> = doses.iter().map(|dose| dose / critical).collect();
+            let [from, to] = case.notch(&scaled);
+            *(if to - from > um { &mut low } else { &mut high }) = critical;
+        }
+        Self { critical: low, ..case }
     }
 
     /// White light cures 19.1e-2 mm2 under the slope.
@@ -56,6 +74,21 @@ impl Case {
         self.part.holds([place % width, place / width, layers - 1 - layer])
     }
 
+    /// Returns the heights between which the middle of the notch is cured, in micrometers from the
+    /// light, with doses that are exponential between the middles of voxels.
+    fn notch(&self, doses: &[f64]) -> [f64; 2] {
+        let [width, height, layers] = self.part.size();
+        let middle = |layer: usize| doses[(layer * height + height / 2) * width + width / 2].ln();
+        let column: Vec<f64> = (0..layers).map(middle).collect();
+        let crosses = |pair: &[f64]| (pair[0] < 0.0) != (pair[1] < 0.0);
+        let of = |at: usize| {
+            let share = column[at] / (column[at] - column[at + 1]);
+            self.part.thickness().um() * (at as f64 + 0.5 + share)
+        };
+        let mut pairs = column.windows(2);
+        [pairs.clone().position(crosses), pairs.rposition(crosses)].map(|at| at.map_or(0.0, of))
+    }
+
     fn white(&self) -> Vec<f64> {
         let voxels: usize = self.part.size().iter().product();
         (0..voxels).map(|voxel| f64::from(u8::from(self.holds(voxel)))).collect()
@@ -82,7 +115,8 @@ impl Case {
         doses.iter().enumerate().filter(is_over).count() as f64
     }
 
-    fn plan(&self, options: &Options) -> Outcome {
+    /// Plans, and returns the light of the gray levels with the outcome.
+    fn plan(&self, options: &Options) -> (Outcome, Vec<f64>) {
         let light = Light {
             intensity: Intensity::from_mw_per_cm2(1.0),
             intensity_of: IntensityOf::Pixel(self.part.pitch()),
@@ -91,7 +125,7 @@ impl Case {
                 self.part.thickness().um() / (self.fade * std::f64::consts::LN_10),
             ),
             spread: [Length::from_um(self.sigma * self.part.pitch().um()); 2],
-            gamma: 2.404,
+            gamma: GAMMA,
             at: SampleHeight::Top,
         };
         let layers = self.part.layers().map(|mut layer| {
@@ -100,8 +134,16 @@ impl Case {
         });
         let options = Options { around: Some(0), ..*options };
         let mut planned = plan(layers, &light, &options, |_| {}).unwrap();
-        planned.by_ref().for_each(|layer| drop(layer.unwrap()));
-        planned.outcome()
+        let of_layer = |layer: &Layer| {
+            let [width, height, _] = self.part.size().map(|size| size as u32);
+            let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
+            let light = |(column, row)| f64::from(layer.image.level(column, row)) / 255.0;
+            places.map(light).map(|share| share.powf(GAMMA)).collect()
+        };
+        let mut layers: Vec<Vec<f64>> =
+            planned.by_ref().map(|layer| of_layer(&layer.unwrap())).collect();
+        layers.reverse();
+        (planned.outcome(), layers.concat())
     }
 }
 
@@ -130,7 +172,7 @@ fn the_helix_loses_overcured_voxels_as_in_001() {
             gap: 3e-3,
             ..Options::default()
         };
-        let outcome = helix.plan(&options);
+        let (outcome, _) = helix.plan(&options);
         assert!(outcome.bound <= outcome.after.cost);
         assert!(share_lost(&outcome) < 0.025, "{:?}", outcome.after.counts);
         percent_less(&helix.part, &outcome)
@@ -144,7 +186,7 @@ fn the_helix_loses_overcured_voxels_as_in_001() {
 #[test]
 fn nearly_nothing_of_the_helix_is_wrong_in_the_end() {
     let helix = Case::helix();
-    let outcome = helix.plan(&Options::default());
+    let (outcome, _) = helix.plan(&Options::default());
     let [over, _] = percent_less(&helix.part, &outcome);
     assert!(over >= 98.0, "{over}");
     assert!(share_lost(&outcome) <= 0.02, "{:?}", outcome.after.counts);
@@ -189,7 +231,7 @@ fn the_slope_is_cured_as_it_should_be() {
     assert!((under * slope.voxel_mm2() - 19.1e-2).abs() < 3e-4);
 
     let options = Options { objective: VoxelObjective::Boundary, gap: 5e-3, ..Options::default() };
-    let outcome = slope.plan(&options);
+    let (outcome, _) = slope.plan(&options);
     let over = outcome.after.counts.overcured as f64 * slope.voxel_mm2();
     assert!(over <= 1e-2, "{over}");
     assert!(share_lost(&outcome) < 0.01, "{:?}", outcome.after.counts);
@@ -200,7 +242,7 @@ fn windows_are_nearly_as_good_as_the_whole_and_show_no_seams() {
     for slope in [Case::slope(4.0), Case::slope(13.0)] {
         let plan_in = |settled, ahead| {
             let window = Some(Window { settled, ahead });
-            slope.plan(&Options { margin: 0.0, window, gap: 2e-4, ..Options::default() })
+            slope.plan(&Options { margin: 0.0, window, gap: 2e-4, ..Options::default() }).0
         };
         let (whole, windows) = (plan_in(80, 0), plan_in(15, 15));
         let worse = (windows.after.cost - whole.bound) / whole.before.cost;
@@ -212,4 +254,32 @@ fn windows_are_nearly_as_good_as_the_whole_and_show_no_seams() {
             assert!(wrong(windows) <= wrong(whole) + 3, "{windows:?} {whole:?}");
         }
     }
+}
+
+/// 001's white notch, 590 um for 479 (section 6), needs 2.5 times the critical dose of 001's percentages.
+/// White then leaves the upper 212 um of the notch liquid, and no plan of lit pixels cures them.
+#[test]
+fn the_notch_is_590_um_thick_by_white_light() {
+    let helix = Case::with_notch(590.0);
+    assert!((helix.critical / Case::helix().critical - 2.5).abs() < 0.05, "{}", helix.critical);
+    let white = helix.doses(&helix.white());
+    let [from, to] = helix.notch(&white);
+    assert!((to - from - 590.0).abs() < 0.01, "{from} {to}");
+    // In voxels, the notch is wanted from 840 to 1344 um.
+    assert!((from - 840.0 - 212.0).abs() < 1.0 && (to - 1344.0 - 298.0).abs() < 1.0, "{from} {to}");
+    let cured = white.iter().filter(|&&dose| dose >= 1.0).count();
+    assert!((cured as f64 / helix.part.count() as f64 - 0.916).abs() < 2e-3, "{cured}");
+
+    let plan = |objective, sources| {
+        let options = Options { objective, sources, gap: 3e-3, ..Options::default() };
+        let (outcome, light) = helix.plan(&options);
+        (percent_less(&helix.part, &outcome)[0], helix.notch(&helix.doses(&light)))
+    };
+    // The rule of 001 takes as much of the overcure as it printed, 24.7 %, and nothing of the notch,
+    // whose middle is no boundary.
+    let (over, [from, to]) = plan(VoxelObjective::Boundary, Sources::Shell(1));
+    assert!((over - 24.9).abs() < 1.0 && (to - from - 590.0).abs() < 2.0, "{over} {from} {to}");
+    let (over, [from, to]) = plan(VoxelObjective::Wrong, Sources::Lit);
+    assert!(over > 94.0 && (to - 1344.0).abs() < 10.0, "{over} {to}");
+    assert!((from - 840.0 - 212.0).abs() < 2.0, "{from}");
 }
