@@ -10,7 +10,7 @@ use anyhow::anyhow;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_gantry::GivenTimes;
-use lamp_grayscale::resin::Intensity;
+use lamp_grayscale::resin::{Intensity, plausible};
 use lamp_pipeline::heights::Seconds;
 use lamp_pipeline::memory::{in_words, within_limits};
 use lamp_stack::{Length, LengthError, Named, StackFormat, skip_sync};
@@ -311,7 +311,7 @@ pub(crate) fn parse_light(text: &str) -> Result<Intensity, String> {
         Ok(light) if light.mw_per_cm2() == 0.0 => {
             Err("the intensity must be above zero".to_owned())
         }
-        Ok(light) if Intensity::PLAUSIBLE.contains(&light) => Ok(light),
+        Ok(light) if plausible::INTENSITY.contains(&light) => Ok(light),
         Ok(_) => Err("the intensity must be between 1e-6 and 1e9 mW/cm2".to_owned()),
         Err(error) => Err(error.to_string()),
     }

@@ -6,7 +6,7 @@ use lamp_stack::Length;
 
 use super::csv_table::{CsvTable, TableRow};
 use super::measurements::DataError;
-use crate::resin::{Dose, ExposureTime, Intensity};
+use crate::resin::{Dose, ExposureTime, Intensity, plausible};
 
 pub(super) const DOSE: &str = "dose_mj_per_cm2";
 pub(super) const EXPOSURE: &str = "exposure_ms";
@@ -153,7 +153,7 @@ impl DoseColumn {
                 "a time that makes a dose from 1e-6 to 1e9 mJ/cm2 under that light",
             ),
         };
-        let plausible = Dose::PLAUSIBLE.contains(&dose);
+        let plausible = plausible::DOSE.contains(&dose);
         if plausible { Ok(dose) } else { Err(self.column.impossible(row, wanted)) }
     }
 }

@@ -7,7 +7,7 @@ use super::measurements::DepthPoint;
 use super::regression::LineFit;
 use super::{Estimate, FitError};
 use crate::material::CurveNumbers;
-use crate::resin::Dose;
+use crate::resin::{Dose, plausible};
 
 /// A working curve found from measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub fn fit_curve(points: &[DepthPoint]) -> Result<CurveFit, FitError> {
     let line = LineFit::new(&logs)?.rising("um for each e-fold of dose")?;
     // 002 eq. 30 over ln E is a line of slope D_p that meets zero at ln E_c.
     let [value, low, high] = line.zero().map(f64::exp);
-    if !Dose::PLAUSIBLE.contains(&Dose::from_mj_per_cm2(value)) {
+    if !plausible::DOSE.contains(&Dose::from_mj_per_cm2(value)) {
         return Err(FitError::NoCriticalDose(value));
     }
     Ok(CurveFit {

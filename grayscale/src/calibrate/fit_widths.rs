@@ -10,7 +10,7 @@ use super::measurements::WidthPoint;
 use super::student_t::t_95;
 use super::{Estimate, FitError, PointGroup, least_squares};
 use crate::material::WidthNumbers;
-use crate::resin::{Dose, WidthSensitivity};
+use crate::resin::{Dose, WidthSensitivity, plausible};
 
 /// The cure width of squares of one size, found from measurements.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,7 +74,7 @@ fn fit_size(feature_size: Length, points: &[WidthPoint]) -> Result<WidthFit, Fit
     let pairs: Vec<_> = points.iter().map(|p| (p.dose.mj_per_cm2(), p.width.um())).collect();
     let hinge = HingeFit::new(&pairs, "um for each mJ/cm2")?;
     let [onset, low, high] = hinge.onset;
-    if !Dose::PLAUSIBLE.contains(&Dose::from_mj_per_cm2(onset)) {
+    if !plausible::DOSE.contains(&Dose::from_mj_per_cm2(onset)) {
         return Err(FitError::NoCriticalDose(onset));
     }
     let [slope, least, most] = hinge.slope;

@@ -7,7 +7,7 @@ use super::columns::{Column, DOSE, DoseColumn, EXPOSURE, LENGTHS, check_columns}
 use super::csv_table::{CsvTable, TableRow};
 use super::fit_scan::{LineKind, ScanDirection};
 use crate::material::LawVariable;
-use crate::resin::{Dose, GrayLevel, Intensity, cure_width_of_square};
+use crate::resin::{Dose, GrayLevel, Intensity, cure_width_of_square, plausible};
 
 /// A measured cure depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -207,7 +207,7 @@ pub fn depth_points(
         }
         let point = DepthPoint { gray, dose, depth: of_row };
         // Fits take the logarithm of the dose that arrives, and black has none.
-        if !Dose::PLAUSIBLE.contains(&point.arriving()) {
+        if !plausible::DOSE.contains(&point.arriving()) {
             return Err(depth.impossible(row, "what so dark a gray level cures"));
         }
         Ok(RowContent::Point(point))

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use crate::material::{LawVariable, Material, MaterialError};
-use crate::resin::{Intensity, OpticalDensity, QuantityError};
+use crate::resin::{Intensity, OpticalDensity, QuantityError, plausible};
 
 /// The light of full white now: a light, or a part of the material's own.
 ///
@@ -80,7 +80,7 @@ pub enum LampError {
 pub fn parse_lamp_light(text: &str) -> Result<Intensity, LampLightError> {
     match text.parse::<Intensity>()? {
         light if light.mw_per_cm2() == 0.0 => Err(LampLightError::Dark),
-        light if Intensity::PLAUSIBLE.contains(&light) => Ok(light),
+        light if plausible::INTENSITY.contains(&light) => Ok(light),
         _ => Err(LampLightError::Implausible),
     }
 }

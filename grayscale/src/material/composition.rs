@@ -11,7 +11,7 @@ use super::{Constant, CurveNumbers, Given, GivenNumber, Material};
 use crate::resin::shrinkage::{self, Monomer};
 use crate::resin::{
     Absorber, Absorptivity, Concentration, Inhibition, Intensity, ModelError, Quantity, Suspension,
-    WorkingCurve, refractive_contrast,
+    WorkingCurve, plausible, refractive_contrast,
 };
 
 /// The ingredients of a suspension, from which the models of 002 sections 3.4.2.2 to 3.4.2.4
@@ -155,9 +155,13 @@ pub enum CompositionError {
     /// Shrinkage needs one of two.
     #[error("shrinkage needs either conversion or spectra")]
     NoConversion,
+    /// A number is outside of all that are known.
+    #[error(transparent)]
+    Implausible(#[from] ModelError),
     /// The numbers give no working curve.
+    // No source: this message contains the problem's text.
     #[error("the composition makes no working curve: its {0}")]
-    NoCurve(#[from] ModelError),
+    NoCurve(ModelError),
 }
 
 const POSITIVE: &str = "above zero";
@@ -179,11 +183,21 @@ impl Catalogued for Composition {
         check_light(self)?;
         if let Some(Ceramic { share, scattering_length, refraction }) = &self.ceramic {
             number((0.0..1.0).contains(&share.value), "ceramic.share", "from 0 to below 1")?;
-            number(positive(scattering_length.value.um()), "ceramic.scattering-length", POSITIVE)?;
+            plausible::DEPTH.check("ceramic.scattering-length", scattering_length.value)?;
             let indices = refraction.iter().flat_map(|it| [it.ceramic.value, it.liquid.value]);
             number(indices.into_iter().all(positive), "ceramic.refraction", POSITIVE)?;
         }
+        let dye = self.uv_absorber.as_ref();
+        for (name, substance) in
+            [("photoinitiator", Some(&self.photoinitiator)), ("uv-absorber", dye)]
+        {
+            let Some(Dissolved { concentration, absorptivity }) = substance else { continue };
+            plausible::CONCENTRATION.check_or_zero(name, concentration.value)?;
+            let absorptivity = absorptivity.as_ref().map_or(Absorptivity::default(), |it| it.value);
+            plausible::ABSORPTIVITY.check_or_zero(name, absorptivity)?;
+        }
         let of = &self.inhibition;
+        plausible::CONCENTRATION.check_or_zero("inhibition.inhibitor", of.inhibitor.value)?;
         let photon = of.radicals_per_photon.value;
         number(positive(photon), "inhibition.radicals-per-photon", POSITIVE)?;
         let dye = of.radicals_per_dye.as_ref().map_or(0.0, |it| it.value);
@@ -276,13 +290,14 @@ impl Composition {
         self.wavelength.as_ref().map_or_else(of_peaks, |it| it.value)
     }
 
-    fn working_curve(&self) -> Result<WorkingCurve, ModelError> {
+    fn working_curve(&self) -> Result<WorkingCurve, CompositionError> {
         let (suspension, inhibition) = (self.suspension(), self.inhibition());
         let critical = match self.inhibition.attenuated_by {
             AttenuatedBy::All => suspension.critical_dose(&inhibition),
             AttenuatedBy::Photoinitiator => suspension.critical_dose_of_initiator(&inhibition),
         };
         WorkingCurve::new(critical, suspension.penetration_depth())
+            .map_err(CompositionError::NoCurve)
     }
 
     /// Returns the inhibition that keeps the resin from curing.

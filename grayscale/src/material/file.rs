@@ -3,8 +3,8 @@
 use lamp_stack::{Builtin, CatalogueError, Catalogued, Length, one_line};
 use thiserror::Error;
 
-use super::{LawVariable, Material};
-use crate::resin::ModelError;
+use super::{LawVariable, Material, of};
+use crate::resin::{ModelError, plausible};
 
 /// Why a material's numbers make no models.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -22,8 +22,8 @@ pub enum MaterialError {
     /// The light of full white is not above zero.
     #[error("intensity.value must be above zero")]
     Dark,
-    /// The exponent of the light over the gray level is not above zero.
-    #[error("gamma.value must be above zero")]
+    /// The exponent of the light over the gray level is none of a display.
+    #[error("gamma.value must be above zero and at most 20")]
     Gamma,
     /// Cure widths of one direction only.
     #[error("cure-width has one direction: give `across` and `along`, or none")]
@@ -110,6 +110,9 @@ impl Catalogued for Material {
     fn check(&self) -> Result<(), MaterialError> {
         if self.intensity.as_ref().is_some_and(|light| light.value.mw_per_cm2() == 0.0) {
             return Err(MaterialError::Dark);
+        }
+        if let Some(light) = &self.intensity {
+            plausible::INTENSITY.check("value", light.value).map_err(of("intensity"))?;
         }
         if let Some((name, _)) = self.constants.iter().find(|(_, c)| !c.value.is_finite()) {
             return Err(MaterialError::NoNumber(one_line(name)));
@@ -368,7 +371,7 @@ source = "notebook, page 3"
         );
         for gamma in ["0", "-1", "nan", "inf"] {
             let said = refused(&format!("[gamma]\nvalue = {gamma}\nsource = \"a\"\n"));
-            assert_eq!(said, "gamma.value must be above zero");
+            assert_eq!(said, "gamma.value must be above zero and at most 20");
         }
     }
 

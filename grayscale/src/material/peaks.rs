@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::composition::{Composition, CompositionError};
 use super::{Given, GivenNumber};
-use crate::resin::Absorptivity;
+use crate::resin::{Absorptivity, plausible};
 
 /// A peak of a lamp's spectrum, and what absorbs its light (002 section 3.4.2.4 and figure 60).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ pub(super) fn check_light(of: &Composition) -> Result<(), CompositionError> {
             substances().all(|it| it.absorptivity.is_some()),
             "photoinitiator and uv-absorber need their absorptivity at the wavelength",
         )?;
-        return positive(wavelength.value.um(), "wavelength");
+        return Ok(plausible::WAVELENGTH.check("wavelength", wavelength.value)?);
     }
     light(!of.peaks.is_empty(), "give the light's wavelength, or the lamp's peaks")?;
     light(
@@ -57,9 +57,13 @@ pub(super) fn check_light(of: &Composition) -> Result<(), CompositionError> {
         "each peak needs the uv-absorber's absorptivity, if there is one",
     )?;
     of.peaks.iter().try_for_each(|peak| {
-        positive(peak.wavelength.value.um(), "peaks.wavelength")?;
+        plausible::WAVELENGTH.check("peaks.wavelength", peak.wavelength.value)?;
         positive(peak.share.value, "peaks.share")?;
-        positive(peak.photoinitiator.value.m2_per_mol(), "peaks.photoinitiator")
+        plausible::ABSORPTIVITY.check("peaks.photoinitiator", peak.photoinitiator.value)?;
+        let absorber = peak.uv_absorber.as_ref();
+        absorber.map_or(Ok(()), |it| {
+            Ok(plausible::ABSORPTIVITY.check_or_zero("peaks.uv-absorber", it.value)?)
+        })
     })
 }
 

@@ -2,7 +2,8 @@
 
 use lamp_stack::Length;
 
-use super::model::{CureModel, ModelError, positive};
+use super::model::{CureModel, ModelError};
+use super::plausible;
 use super::units::{Dose, GrayLevel};
 use super::working_curve::WorkingCurve;
 
@@ -23,7 +24,7 @@ impl GaussianBeam {
     /// # Errors
     /// Returns an error if the width is not above zero.
     pub fn new(width: Length) -> Result<Self, ModelError> {
-        positive(width.um(), "beam-width")?;
+        plausible::SPREAD.check("beam-width", width)?;
         Ok(Self { width })
     }
 

@@ -2,7 +2,8 @@
 
 use lamp_stack::Length;
 
-use super::model::{ModelError, positive};
+use super::model::ModelError;
+use super::plausible;
 use super::units::{Dose, WidthSensitivity};
 
 /// The cure width `C_w = D_p^w (E - E_c^w)`, the distance of the edges of a
@@ -53,9 +54,9 @@ impl CureWidth {
     /// Returns an error if there is no size, a size occurs twice, or a number is not above zero.
     pub fn new(mut lines: Vec<WidthLine>) -> Result<Self, ModelError> {
         for line in &lines {
-            positive(line.feature_size.um(), "feature-size")?;
-            positive(line.critical_dose.mj_per_cm2(), "critical-dose")?;
-            positive(line.sensitivity.um_per_mj_per_cm2(), "sensitivity")?;
+            plausible::FEATURE.check("feature-size", line.feature_size)?;
+            plausible::DOSE.check("critical-dose", line.critical_dose)?;
+            plausible::SENSITIVITY.check("sensitivity", line.sensitivity)?;
         }
         lines.sort_by(|a, b| a.feature_size.um().total_cmp(&b.feature_size.um()));
         let twice = |pair: &[WidthLine]| pair[0].feature_size == pair[1].feature_size;

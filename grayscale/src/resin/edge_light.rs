@@ -4,7 +4,8 @@ use std::f64::consts::{SQRT_2, TAU};
 
 use lamp_stack::Length;
 
-use super::model::{ModelError, positive};
+use super::model::ModelError;
+use super::plausible;
 use super::spread::Spread;
 use super::units::Dose;
 
@@ -26,7 +27,7 @@ impl EdgeLight {
     /// # Errors
     /// Returns an error if the dose is not above zero.
     pub fn new(spread: Spread, critical_dose: Dose) -> Result<Self, ModelError> {
-        positive(critical_dose.mj_per_cm2(), "critical-dose")?;
+        plausible::DOSE.check("critical-dose", critical_dose)?;
         Ok(Self { spread, critical_dose })
     }
 

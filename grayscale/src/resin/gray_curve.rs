@@ -2,7 +2,8 @@
 
 use lamp_stack::Length;
 
-use super::model::{CureError, CureModel, ModelError, check_reach, positive};
+use super::model::{CureError, CureModel, ModelError, check_reach};
+use super::plausible::{self, Plausible};
 use super::units::{Dose, GrayLevel, Intensity, Quantity};
 use super::working_curve::WorkingCurve;
 
@@ -25,8 +26,13 @@ impl<T: Quantity> StraightLine<T> {
     /// With `E_c` and `D_p` that rise, the cure depth rises with the gray level wherever
     /// anything cures: `D_p` does, `G I_0 t / E_c(G)` does where `E_c(0) > 0`, and its
     /// logarithm is above zero there.
-    fn check(self, at_zero: &'static str, rise: &'static str) -> Result<(), ModelError> {
-        positive(self.at_zero.number(), at_zero)?;
+    fn check(
+        self,
+        range: Plausible<T>,
+        at_zero: &'static str,
+        rise: &'static str,
+    ) -> Result<(), ModelError> {
+        range.check(at_zero, self.at_zero)?;
         let no_fall = self.rise.number() >= 0.0 && self.rise.number().is_finite();
         if no_fall { Ok(()) } else { Err(ModelError::Falls(rise)) }
     }
@@ -49,8 +55,12 @@ impl ParameterLines {
         critical_dose: StraightLine<Dose>,
         penetration_depth: StraightLine<Length>,
     ) -> Result<Self, ModelError> {
-        critical_dose.check("critical-dose.at-zero", "critical-dose.rise")?;
-        penetration_depth.check("penetration-depth.at-zero", "penetration-depth.rise")?;
+        critical_dose.check(plausible::DOSE, "critical-dose.at-zero", "critical-dose.rise")?;
+        penetration_depth.check(
+            plausible::DEPTH,
+            "penetration-depth.at-zero",
+            "penetration-depth.rise",
+        )?;
         Ok(Self { critical_dose, penetration_depth })
     }
 

@@ -2,7 +2,8 @@
 
 use lamp_stack::Length;
 
-use super::model::{ModelError, positive, zero_or_more};
+use super::model::{ModelError, positive};
+use super::plausible;
 use super::units::{Absorptivity, Concentration, Diffusivity, Intensity, Quantity, RateConstant};
 
 /// Avogadro's number, in 1/mol, times Planck's constant, in J s, times the speed of light, in m/s.
@@ -10,9 +11,6 @@ const MOLE_OF_PHOTONS: f64 = 6.022_140_76e23 * 6.626_070_15e-34 * 2.997_924_58e8
 
 /// 003's factor from decadic to natural absorption (its equation 4).
 const DECADES: f64 = 2.3;
-
-/// Beyond this no rate is known: a typing error that would overflow.
-const LARGEST: f64 = 1e9;
 
 /// The rates by which light makes radicals, radicals use up double bonds, and oxygen stops
 /// radicals (003 section 4.1 and table 1).
@@ -41,32 +39,22 @@ pub struct Kinetics {
 }
 
 impl Kinetics {
-    /// Returns the rates if each is possible: oxygen and its diffusion zero or more, all others
-    /// above zero, shares below or at 1.
+    /// Returns the rates if each is [plausible], where oxygen, its diffusion and its rate may be zero,
+    /// and shares are at most 1.
     ///
     /// # Errors
     /// Returns an error that names the number otherwise.
     pub fn checked(self) -> Result<Self, ModelError> {
-        let above_zero = [
-            (self.wavelength.um(), "wavelength"),
-            (self.quantum_efficiency, "quantum-efficiency"),
-            (self.absorptivity.number(), "absorptivity"),
-            (self.propagation.number(), "propagation"),
-            (self.termination.number(), "termination"),
-            (self.photoinitiator.number(), "photoinitiator"),
-            (self.critical_conversion, "critical-conversion"),
-        ];
-        let or_zero = [
-            (self.termination_by_oxygen.number(), "termination-by-oxygen"),
-            (self.oxygen_diffusion.number(), "oxygen-diffusion"),
-            (self.oxygen.number(), "oxygen"),
-        ];
-        above_zero.iter().try_for_each(|&(number, what)| positive(number, what))?;
-        or_zero.iter().try_for_each(|&(number, what)| zero_or_more(number, what))?;
-        let too_large = |&(number, what): &(f64, _)| {
-            if number > LARGEST { Err(ModelError::TooLarge(what, "1e9")) } else { Ok(()) }
-        };
-        above_zero.iter().chain(&or_zero).try_for_each(too_large)?;
+        positive(self.quantum_efficiency, "quantum-efficiency")?;
+        positive(self.critical_conversion, "critical-conversion")?;
+        plausible::WAVELENGTH.check("wavelength", self.wavelength)?;
+        plausible::ABSORPTIVITY.check("absorptivity", self.absorptivity)?;
+        plausible::RATE.check("propagation", self.propagation)?;
+        plausible::RATE.check("termination", self.termination)?;
+        plausible::RATE.check_or_zero("termination-by-oxygen", self.termination_by_oxygen)?;
+        plausible::DIFFUSIVITY.check_or_zero("oxygen-diffusion", self.oxygen_diffusion)?;
+        plausible::CONCENTRATION.check_or_zero("oxygen", self.oxygen)?;
+        plausible::CONCENTRATION.check("photoinitiator", self.photoinitiator)?;
         if self.quantum_efficiency > 1.0 {
             return Err(ModelError::TooLarge("quantum-efficiency", "1"));
         }
@@ -136,6 +124,12 @@ mod tests {
         }
         let huge = RateConstant::from_m3_per_mol_s(1e300);
         let text = refused(Kinetics { termination_by_oxygen: huge, ..tmpta() });
-        assert_eq!(text, "termination-by-oxygen must be at most 1e9");
+        let nm_as_um = Length::from_um(365.0);
+        let slip = refused(Kinetics { wavelength: nm_as_um, ..tmpta() });
+        assert!(slip.starts_with("wavelength must be 0.1 to 2 um"), "{slip}");
+        assert_eq!(
+            text,
+            "termination-by-oxygen must be 1e-12 to 1e8 m3/(mol s): a unit or a power of ten may be wrong"
+        );
     }
 }

@@ -12,6 +12,7 @@ mod kinetics;
 mod model;
 #[cfg(test)]
 pub(crate) mod model_laws;
+pub mod plausible;
 pub mod shrinkage;
 mod spread;
 mod two_depth;
@@ -64,7 +65,7 @@ impl Resin {
     /// # Errors
     /// Returns an error if the light is not above zero.
     pub fn new(light: Intensity, model: Box<dyn CureModel>) -> Result<Self, ModelError> {
-        model::positive(light.mw_per_cm2(), "intensity")?;
+        plausible::INTENSITY.check("intensity", light)?;
         Ok(Self { light, model })
     }
 

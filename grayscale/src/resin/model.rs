@@ -150,7 +150,10 @@ pub enum ModelError {
     /// A number is below zero, or not finite.
     #[error("{0} must be zero or more")]
     Negative(&'static str),
-    /// A number is larger than any that is known.
+    /// A number is outside of all that are known.
+    #[error("{0} must be {1}: a unit or a power of ten may be wrong")]
+    Implausible(&'static str, &'static str),
+    /// A share is too large.
     #[error("{0} must be at most {1}")]
     TooLarge(&'static str, &'static str),
     /// A slope is below zero, or not finite.

@@ -2,7 +2,8 @@
 
 use lamp_stack::Length;
 
-use super::model::{ModelError, positive, zero_or_more};
+use super::model::{ModelError, zero_or_more};
+use super::plausible;
 
 /// Light that falls off as `exp(-x²/2σ_x² - y²/2σ_y²)` at the distances `x` across the scan and `y`
 /// along it from a pixel's center (001 eq. 3 and 5, with one `σ`). `σ` is half of 002's Gaussian
@@ -58,7 +59,7 @@ impl Spread {
     }
 
     fn checked(across: Length, along: Length, pixel: Option<Length>) -> Result<Self, ModelError> {
-        pixel.map_or(Ok(()), |pixel| positive(pixel.um(), "pixel"))?;
+        pixel.map_or(Ok(()), |pixel| plausible::SIDE.check("pixel", pixel))?;
         Ok(Self { across, along, pixel })
     }
 

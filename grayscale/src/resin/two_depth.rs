@@ -2,7 +2,8 @@
 
 use lamp_stack::Length;
 
-use super::model::{CureError, CureModel, DepthRange, ModelError, positive};
+use super::model::{CureError, CureModel, DepthRange, ModelError};
+use super::plausible;
 use super::units::Dose;
 use super::working_curve::WorkingCurve;
 
@@ -35,9 +36,9 @@ impl TwoDepth {
         solid_depth: Length,
         depths: DepthRange,
     ) -> Result<Self, ModelError> {
-        positive(critical_dose.mj_per_cm2(), "critical-dose")?;
-        positive(liquid_depth.um(), "liquid-depth")?;
-        positive(solid_depth.um(), "solid-depth")?;
+        plausible::DOSE.check("critical-dose", critical_dose)?;
+        plausible::DEPTH.check("liquid-depth", liquid_depth)?;
+        plausible::DEPTH.check("solid-depth", solid_depth)?;
         let begins = depths.from.um() >= 0.0 && depths.from.um().is_finite();
         if !begins || depths.to.is_some_and(|to| !(to > depths.from && to.um().is_finite())) {
             return Err(ModelError::NoDepths);

@@ -1,7 +1,7 @@
 //! Doses, intensities, exposure times and gray levels, parsed from texts with units.
 
 use std::fmt;
-use std::ops::{Div, Mul, RangeInclusive};
+use std::ops::{Div, Mul};
 use std::str::FromStr;
 
 use lamp_stack::Length;
@@ -175,16 +175,6 @@ quantity! {
     /// How fast a species spreads in a resin. Parsed from `m2/s` or `um2/s`.
     Diffusivity, "a diffusivity", "m²/s", from_m2_per_s, m2_per_s, "m2/s", "1e-10 m2/s",
     [("um2/s", 1.0, 1e12)]
-}
-
-impl Dose {
-    /// 1e-6 to 1e9 mJ/cm². No measurement of a resin lies outside, but a typing error may.
-    pub const PLAUSIBLE: RangeInclusive<Self> = Self(1e-6)..=Self(1e9);
-}
-
-impl Intensity {
-    /// 1e-6 to 1e9 mW/cm². No lamp lies outside, but a typing error may.
-    pub const PLAUSIBLE: RangeInclusive<Self> = Self(1e-6)..=Self(1e9);
 }
 
 /// 002 eq. 27: 1 W/cm² for 1 ms is 1 mJ/cm².

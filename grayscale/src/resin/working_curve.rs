@@ -2,7 +2,8 @@
 
 use lamp_stack::Length;
 
-use super::model::{CureError, CureModel, ModelError, positive};
+use super::model::{CureError, CureModel, ModelError};
+use super::plausible;
 use super::units::Dose;
 
 /// The Jacobs working curve `C_d = D_p ln(E / E_c)` (002 eq. 30).
@@ -32,8 +33,8 @@ impl WorkingCurve {
     /// # Errors
     /// Returns an error if either is not above zero.
     pub fn new(critical_dose: Dose, penetration_depth: Length) -> Result<Self, ModelError> {
-        positive(critical_dose.mj_per_cm2(), "critical-dose")?;
-        positive(penetration_depth.um(), "penetration-depth")?;
+        plausible::DOSE.check("critical-dose", critical_dose)?;
+        plausible::DEPTH.check("penetration-depth", penetration_depth)?;
         Ok(Self { critical_dose, penetration_depth })
     }
 

@@ -1,7 +1,6 @@
 //! Projector files.
 
-use lamp_grayscale::material::Given;
-use lamp_grayscale::resin::{Intensity, Quantity};
+use lamp_grayscale::resin::{Intensity, ModelError, plausible};
 use lamp_stack::{Builtin, Catalogued, Length};
 use thiserror::Error;
 
@@ -14,12 +13,9 @@ pub enum ProjectorError {
     /// The display has no mirrors, or more than any display has.
     #[error("display: columns and rows must be between 1 and 32768, 67 million mirrors at most")]
     Display,
-    /// A number is not above zero, or too large for a projector.
-    #[error("{0} must be above zero, and at most {1}")]
-    Impossible(&'static str, &'static str),
-    /// A number is negative, or too large for a projector.
-    #[error("{0} must be zero or more, and at most {1}")]
-    Negative(&'static str, &'static str),
+    /// A number is outside of all that are known.
+    #[error(transparent)]
+    Implausible(#[from] ModelError),
     /// The file gives no spread of light, or two.
     #[error("spread: give either cone or sigma")]
     Spread,
@@ -31,7 +27,7 @@ pub enum ProjectorError {
     Rays,
     /// No projector has this light: a unit may be wrong.
     #[error("the light of a wide white field is {0}: no projector has this little or this much")]
-    Implausible(Intensity),
+    ImplausibleLight(Intensity),
     /// The shares of gray levels are invalid.
     #[error(
         "gray: shares must go from level 0 to 255, levels rising, shares from 0 to 1 and never falling"
@@ -95,23 +91,23 @@ impl Catalogued for Projector {
         if !(possible(columns) && possible(rows) && columns * rows <= MOST_MIRRORS[1]) {
             return Err(ProjectorError::Display);
         }
-        above_zero("pitch.value", &self.pitch, 1e4, "10 mm")?;
+        plausible::SIDE.check("pitch.value", self.pitch.value)?;
         if let Some(mirror) = &self.mirror {
-            above_zero("mirror.side", &mirror.side, 1e4, "10 mm")?;
-            not_negative("mirror.gap", &mirror.gap, 1e4, "10 mm")?;
+            plausible::SIDE.check("mirror.side", mirror.side.value)?;
+            plausible::SIDE.check_or_zero("mirror.gap", mirror.gap.value)?;
         }
         if let Some(voxel) = &self.voxel {
-            above_zero("voxel.value", voxel, 1e4, "10 mm")?;
+            plausible::SIDE.check("voxel.value", voxel.value)?;
         }
         if let Some(chamber) = &self.chamber {
-            above_zero("chamber.value", chamber, 1e6, "1 m")?;
+            plausible::CHAMBER.check("chamber.value", chamber.value)?;
         }
         match (&self.spread.cone, &self.spread.sigma) {
-            (Some(cone), None) => not_negative("spread.cone", cone, 1e4, "10 mm")?,
-            (None, Some(sigma)) => not_negative("spread.sigma", sigma, 1e4, "10 mm")?,
+            (Some(cone), None) => plausible::SPREAD.check_or_zero("spread.cone", cone.value)?,
+            (None, Some(sigma)) => plausible::SPREAD.check_or_zero("spread.sigma", sigma.value)?,
             _ => return Err(ProjectorError::Spread),
         }
-        above_zero("step.value", &self.step, 6e4, "a minute")?;
+        plausible::STEP.check("step.value", self.step.value)?;
         self.check_light()?;
         self.gray.as_ref().map_or(Ok(()), GrayLight::check)?;
         self.lens.as_ref().map_or(Ok(()), |lens| lens.check(self.mirror_image()))
@@ -125,8 +121,8 @@ impl Projector {
         }
         self.rays.as_ref().map_or(Ok(()), Rays::check)?;
         let light = self.irradiance();
-        let plausible = Intensity::PLAUSIBLE.contains(&light);
-        if plausible { Ok(()) } else { Err(ProjectorError::Implausible(light)) }
+        let fine = plausible::INTENSITY.contains(&light);
+        if fine { Ok(()) } else { Err(ProjectorError::ImplausibleLight(light)) }
     }
 }
 
@@ -157,9 +153,9 @@ impl Lens {
             ("lens.object", &self.object),
             ("lens.image", &self.image),
         ] {
-            above_zero(key, length, 1e7, "10 m")?;
+            plausible::LENS.check(key, length.value)?;
         }
-        not_negative("lens.thickness", &self.thickness, 1e6, "1 m")?;
+        plausible::LENS.check_or_zero("lens.thickness", self.thickness.value)?;
         if !(1.0 < self.index.value && self.index.value <= 5.0) {
             return Err(ProjectorError::Index);
         }
@@ -181,27 +177,6 @@ impl Lens {
 
 fn rounded_to_10_um(um: f64) -> Length {
     Length::from_um((um / 10.0).round() * 10.0)
-}
-
-fn above_zero<T: Quantity>(
-    key: &'static str,
-    given: &Given<T>,
-    most: f64,
-    in_words: &'static str,
-) -> Result<(), ProjectorError> {
-    let number = given.value.number();
-    let possible = number > 0.0 && number <= most;
-    if possible { Ok(()) } else { Err(ProjectorError::Impossible(key, in_words)) }
-}
-
-fn not_negative(
-    key: &'static str,
-    given: &Given<Length>,
-    most: f64,
-    in_words: &'static str,
-) -> Result<(), ProjectorError> {
-    let possible = (0.0..=most).contains(&given.value.um());
-    if possible { Ok(()) } else { Err(ProjectorError::Negative(key, in_words)) }
 }
 
 #[cfg(test)]
@@ -293,7 +268,7 @@ divergence = { value = 1, source = "data sheet" }
             ("1920\nrows = 1080", "32768\nrows = 32768", &["display", "67 million"]),
             ("15.2 um", "15.2", &["line 14", "pitch.value", "unit"]),
             ("15.2 um", "0 um", &["pitch.value must be above zero"]),
-            ("15.2 um", "1 m", &["pitch.value", "at most 10 mm"]),
+            ("15.2 um", "15.2 mm", &["pitch.value must be 0.01 to 1e4 um: a unit"]),
             ("\"7 um\"", "\"-7 um\"", &["mirror.side must be above zero"]),
             ("0.6 um", "-0.6 um", &["mirror.gap must be zero or more"]),
             ("sigma", "sigmas", &["line 18", "spread", "sigmas"]),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::exposure::MeasuredDoses;
-use lamp_grayscale::resin::{Dose, GaussianBeam, QuantityError, WorkingCurve};
+use lamp_grayscale::resin::{Dose, GaussianBeam, QuantityError, WorkingCurve, plausible};
 use lamp_pipeline::documents::document;
 use lamp_stack::{Length, format_significant};
 
@@ -112,7 +112,7 @@ fn table(beam: GaussianBeam, peak: Dose, curve: &WorkingCurve, critical: Dose) -
 
 fn parse_dose(text: &str) -> Result<Dose, String> {
     match text.parse::<Dose>() {
-        Ok(dose) if Dose::PLAUSIBLE.contains(&dose) => Ok(dose),
+        Ok(dose) if plausible::DOSE.contains(&dose) => Ok(dose),
         Ok(_) => Err("a dose is from 1e-6 to 1e9 mJ/cm2".to_owned()),
         Err(error) => Err(<QuantityError as ToString>::to_string(&error)),
     }

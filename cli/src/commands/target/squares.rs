@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
-use lamp_grayscale::resin::{Dose, Intensity};
+use lamp_grayscale::resin::{Dose, Intensity, plausible};
 use lamp_grayscale::target::{TargetExposure, squares};
 use lamp_stack::{Destination, Dpi, Format, Length, write_stack};
 
@@ -137,7 +137,7 @@ pub(super) fn parse_doses(text: &str) -> Result<Doses, String> {
         let dose: Dose = format!("{}{unit}", text.trim()).parse().map_err(|_| {
             format!("`{text}` is not a dose: write --doses 60..600mJ/cm2 or 60,90,140mJ/cm2")
         })?;
-        if dose.mj_per_cm2() > 0.0 && !Dose::PLAUSIBLE.contains(&dose) {
+        if dose.mj_per_cm2() > 0.0 && !plausible::DOSE.contains(&dose) {
             return Err(format!("`{text}` is not a plausible dose: write 1e-6 to 1e9 mJ/cm2"));
         }
         Ok(dose)
