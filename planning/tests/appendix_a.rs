@@ -66,7 +66,7 @@ fn overcured_voxels_go_from_84_to_none_also_in_levels() {
 
 #[test]
 fn the_error_of_doses_falls_too() {
-    let (stack, _) = planned(&Options { margin: 0.0, around: Some(0), ..Options::default() });
+    let (stack, _) = planned(&Options { margin: Some(0.0), around: Some(0), ..Options::default() });
     let outcome = stack.outcome();
     assert!(outcome.after.cost < 0.9 * outcome.before.cost);
     assert!(outcome.bound <= outcome.after.cost);

@@ -242,7 +242,7 @@ fn windows_are_nearly_as_good_as_the_whole_and_show_no_seams() {
     for slope in [Case::slope(4.0), Case::slope(13.0)] {
         let plan_in = |settled, ahead| {
             let window = Some(Window { settled, ahead });
-            slope.plan(&Options { margin: 0.0, window, gap: 2e-4, ..Options::default() }).0
+            slope.plan(&Options { margin: Some(0.0), window, gap: 2e-4, ..Options::default() }).0
         };
         let (whole, windows) = (plan_in(80, 0), plan_in(15, 15));
         let worse = (windows.after.cost - whole.bound) / whole.before.cost;

@@ -14,7 +14,7 @@ use lamp_pipeline::watcher::Remark;
 use lamp_pipeline::words::{option, optional, path, text};
 use lamp_pipeline::{Error, ErrorKind, memory};
 use lamp_planning::speed::{PartPages, Platform, Speed, SpeedOptions, Wrong, recorded_ms};
-use lamp_planning::voxels::{Options, VoxelCounts, VoxelObjective, VoxelPlanError};
+use lamp_planning::voxels::{DOSE_MARGIN, Options, VoxelCounts, VoxelObjective, VoxelPlanError};
 use lamp_planning::{Light, SampleHeight, speed, voxels};
 use lamp_stack::{Layer, Length, PassingLayer, quoted};
 use pyo3::prelude::*;
@@ -38,8 +38,8 @@ struct PlanSettings {
     lamp_intensity: Option<LampLight>,
     #[serde(with = "text")]
     wanted: NonZeroU8,
-    #[serde(with = "text")]
-    dose_margin: Share,
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    dose_margin: Option<Share>,
     #[serde(with = "text")]
     search_gap: Share,
     #[serde(with = "text")]
@@ -48,12 +48,12 @@ struct PlanSettings {
 
 impl Default for PlanSettings {
     fn default() -> Self {
-        let Options { wanted, margin, gap, .. } = Options::default();
+        let Options { wanted, gap, .. } = Options::default();
         Self {
             material: PathBuf::new(),
             lamp_intensity: None,
             wanted,
-            dose_margin: Share(margin),
+            dose_margin: None,
             search_gap: Share(gap),
             dose_at: SampleHeight::Top,
         }
@@ -232,7 +232,12 @@ impl Planner {
     /// Returns the plan as words of a command, as pages record it.
     fn words(&self, resin: &str) -> String {
         let PlanSettings { wanted, dose_margin, search_gap, dose_at, .. } = self.settings();
-        let (margin, gap) = (100.0 * dose_margin.0, 100.0 * search_gap.0);
+        let usual = match self {
+            Self::Voxels(VoxelSettings { objective: Some(VoxelObjective::Boundary), .. }) => 0.0,
+            _ => DOSE_MARGIN,
+        };
+        let margin = 100.0 * dose_margin.map_or(usual, |margin| margin.0);
+        let gap = 100.0 * search_gap.0;
         let shared = format!(
             "--wanted {wanted} --dose-margin {margin}% --search-gap {gap}% --dose-at {dose_at}"
         );
@@ -351,7 +356,7 @@ fn plan_times(
     let options = SpeedOptions {
         light: resin.light,
         platform: Platform { slowest, fastest, max_change },
-        margin: settings.plan.dose_margin.0,
+        margin: settings.plan.dose_margin.map_or(DOSE_MARGIN, |margin| margin.0),
         gap: settings.plan.search_gap.0,
         memory,
     };
@@ -398,7 +403,7 @@ fn plan_levels(
     let options = Options {
         wanted,
         objective: settings.objective.unwrap_or(VoxelObjective::Wrong),
-        margin: dose_margin.0,
+        margin: dose_margin.map(|margin| margin.0),
         gap: search_gap.0,
         min_level: settings.min_level,
         memory: Some(memory),
@@ -409,7 +414,7 @@ fn plan_levels(
         let layers = layers.map(|layer| {
             let mut layer = layer?.decode().map_err(Error::from)?;
             let given_ms = settings.expose.map(ExposureTime::ms);
-            layer.info.exposure_ms = layer.info.exposure_ms.or(given_ms);
+            layer.info.exposure_ms = given_ms.or(layer.info.exposure_ms);
             times.extend(layer.info.exposure_ms.map(ExposureTime::from_ms));
             resin.record(&mut layer);
             Ok(layer)
@@ -427,7 +432,10 @@ fn plan_levels(
     then(work.watched(Box::new(levels)))?;
     let outcome = plan.outcome();
     let uncurable = outcome.uncurable();
-    if uncurable > 0 {
+    if outcome.cures_nothing() {
+        let why = format!("{name}: the plan cures no wanted voxel");
+        work.say("plan", Remark::warning(why));
+    } else if uncurable > 0 {
         let why = format!("{name}: white light cannot cure {uncurable} wanted voxels");
         work.say("plan", Remark::warning(why));
     }

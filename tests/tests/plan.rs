@@ -208,16 +208,19 @@ fn wanted_pixels_may_be_gray() {
 }
 
 #[test]
-fn pages_without_a_time_get_the_one_given() {
+fn pages_get_the_time_that_is_given() {
     let scratch = with_stairs();
     scratch.stack("silent.tif", cavity_staircase(1).layers());
     scratch.run(&format!("{STAIRS} -o stated.tif")).succeeds();
     let silent = STAIRS.replace("stairs.tif", "silent.tif");
     scratch.run(&format!("{silent} --expose 0.3s -o given.tif")).succeeds();
     assert!(scratch.bytes("stated.tif") == scratch.bytes("given.tif"));
-    // The exposure on pages wins.
-    scratch.run(&format!("{STAIRS} --expose 9s -o kept.tif")).succeeds();
-    assert!(scratch.bytes("stated.tif") == scratch.bytes("kept.tif"));
+    // It replaces the pages' own.
+    let longer = with_stairs();
+    longer.run(&format!("{STAIRS} --expose 0.6s -o given.tif")).succeeds();
+    stack(&longer, "stairs.tif", &cavity_staircase(1), 600.0);
+    longer.run(&format!("{STAIRS} -o stated.tif")).succeeds();
+    assert!(longer.bytes("stated.tif") == longer.bytes("given.tif"));
     scratch.run(&format!("{silent} -o none.tif")).is_refused_with(&[
         "silent.tif",
         "layer 22",
@@ -252,6 +255,39 @@ fn strict_tells_of_what_white_light_cannot_cure() {
     // Longer exposures cure all.
     stack(&scratch, "cylinder.tif", &example_cylinder(), 3000.0);
     scratch.run(&format!("{line} --strict")).succeeds();
+}
+
+#[test]
+fn a_plan_that_cures_nothing_is_a_finding() {
+    let scratch = with_stairs();
+    for (line, why) in [
+        (format!("{STAIRS} --expose 1ms"), "the plan cures no wanted voxel: expose longer"),
+        (
+            "lamp plan speed stairs.tif --material pegda-sudan --speed 1m/s..2m/s".to_owned(),
+            "the plan cures no voxel of the part",
+        ),
+    ] {
+        let ran = scratch.run(&format!("{line} -o none.tif")).succeeds();
+        assert!(ran.stderr.contains(&format!("warning: plan: stairs.tif: {why}")), "{ran:?}");
+        let ran = scratch.run(&format!("{line} --strict -o strict.tif"));
+        assert_eq!(ran.statuses, [Some(3)], "{ran:?}");
+        assert!(!scratch.path("strict.tif").exists());
+    }
+}
+
+/// With a margin, less light loses no target of the part.
+#[test]
+fn boundaries_are_planned_with_a_margin() {
+    let scratch = with_stairs();
+    let lost = |options: &str| {
+        let line = format!("{STAIRS} --objective boundary --report plan.json {options} -o b.tif");
+        scratch.run(&format!("{line} --force")).succeeds();
+        let report = report(&scratch);
+        (report["margin"].as_f64(), report["after"]["at_less_light"]["lost"].as_u64().unwrap())
+    };
+    let (plain, with_margin) = (lost(""), lost("--dose-margin 10%"));
+    assert_eq!([plain.0, with_margin.0], [Some(0.0), Some(0.1)]);
+    assert!(with_margin.1 * 4 < plain.1, "{plain:?} {with_margin:?}");
 }
 
 #[test]

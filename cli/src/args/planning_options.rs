@@ -35,9 +35,9 @@ pub(crate) struct PlanningOptions {
     pub(crate) wanted: NonZeroU8,
 
     /// Margin to the critical dose: wanted voxels should be this far above it, all others this far
-    /// below
-    #[arg(long, value_name = "SHARE", default_value = "5%", value_parser = parse_margin)]
-    pub(crate) dose_margin: f64,
+    /// below [default: 5%, or 0% with --objective boundary]
+    #[arg(long, value_name = "SHARE", value_parser = parse_margin)]
+    pub(crate) dose_margin: Option<f64>,
 
     /// Stop when the plan is proved to be this close to the best one, as a share of the error
     /// without a plan

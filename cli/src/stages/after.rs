@@ -131,7 +131,7 @@ impl After {
             Self::Speed(args) => {
                 let mut args = SpeedArgs::clone(args);
                 args.input.stack = stack.to_owned();
-                args.plan(&Progress::keeping("plan", &kept), |layers| write(layers))?;
+                args.plan(&Progress::keeping("plan", &kept), |layers, _| write(layers))?;
             }
             Self::Layers(stage) => {
                 let working = stage.start(&kept)?;

@@ -51,6 +51,11 @@ impl Wrong {
 }
 
 impl Tally {
+    /// Returns whether no voxel of the part is cured.
+    pub fn cures_nothing(&self) -> bool {
+        self.wrong().under == self.wanted.iter().sum::<u64>()
+    }
+
     pub(crate) fn none(layers: usize) -> Self {
         Self {
             layers: vec![Wrong::default(); layers],

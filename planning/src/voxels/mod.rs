@@ -18,6 +18,6 @@ mod search_sums;
 mod setting;
 mod unplanned;
 
-pub use options::{Options, Sources, VoxelObjective, Window};
+pub use options::{DOSE_MARGIN, Options, Sources, VoxelObjective, Window};
 pub use outcome::{DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelCounts, VoxelTally};
 pub use plan::{VOXELS_CODE, VoxelPlan, VoxelPlanError, most_memory, plan};

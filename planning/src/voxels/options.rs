@@ -36,6 +36,9 @@ pub struct Window {
     pub ahead: usize,
 }
 
+/// The usual margin to the critical dose: light varies by about so much.
+pub const DOSE_MARGIN: f64 = 0.05;
+
 /// The goal of a plan, and the pixels that it may change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
@@ -44,8 +47,9 @@ pub struct Options {
     /// The quantity that the plan minimizes.
     pub objective: VoxelObjective,
     /// The distance from the critical dose at which a voxel is surely cured or surely not: 0.05 is
-    /// 5 %.
-    pub margin: f64,
+    /// 5 %. `None` is 5 % for [`VoxelObjective::Wrong`], and 0 for [`VoxelObjective::Boundary`], as in
+    /// 001.
+    pub margin: Option<f64>,
     /// Pixels whose light is chosen.
     pub sources: Sources,
     /// The lowest level of a pixel that is not black.
@@ -64,12 +68,22 @@ pub struct Options {
     pub window: Option<Window>,
 }
 
+impl Options {
+    /// Returns the margin to the critical dose.
+    pub fn margin(&self) -> f64 {
+        self.margin.unwrap_or(match self.objective {
+            VoxelObjective::Wrong => DOSE_MARGIN,
+            VoxelObjective::Boundary => 0.0,
+        })
+    }
+}
+
 impl Default for Options {
     fn default() -> Self {
         Self {
             wanted: NonZeroU8::new(128).expect("it is above zero"),
             objective: VoxelObjective::Wrong,
-            margin: 0.05,
+            margin: None,
             sources: Sources::Lit,
             min_level: 0,
             keep_wall: 0,

@@ -127,6 +127,12 @@ impl Outcome {
         if self.before.cost > 0.0 { (self.after.cost - self.bound) / self.before.cost } else { 0.0 }
     }
 
+    /// Returns whether the plan cures no wanted voxel, though some are wanted.
+    pub fn cures_nothing(&self) -> bool {
+        let wanted: u64 = self.layers.iter().map(|layer| layer.wanted).sum();
+        wanted > 0 && self.after.counts.undercured == wanted
+    }
+
     /// Returns the wanted voxels that white light does not cure.
     pub fn uncurable(&self) -> u64 {
         self.layers.iter().map(|layer| layer.wanted - layer.targets).sum()

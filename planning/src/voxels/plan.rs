@@ -195,17 +195,17 @@ fn setting(pages: &PageStatements, light: &Light, options: &Options) -> Option<V
     let is_small = longest * longest * layers <= ONE_PIECE;
     // Sixteen standard deviations make the overlap on both sides half of a tile.
     let side = if is_small { longest } else { LEAST_SIDE.max((16.0 * sigma) as usize) };
-    let (least, short_price) = match options.objective {
-        VoxelObjective::Wrong => (1.0 + options.margin, 1.0),
-        VoxelObjective::Boundary => (1.0, PRICE_OF_TARGETS),
+    let short_price = match options.objective {
+        VoxelObjective::Wrong => 1.0,
+        VoxelObjective::Boundary => PRICE_OF_TARGETS,
     };
-    let most = (1.0 - options.margin) as f32;
+    let [least, most] = [1.0 + options.margin(), 1.0 - options.margin()].map(|dose| dose as f32);
     let [image_width, image_height] = image;
     let rules = RoleRules::new(options, image_width, image_height, around);
     Some(VoxelSetting {
         grid: TileGrid { width, height, side },
         rules,
-        terms: Terms { least: least as f32, short_price, most, least_light: 0.0 },
+        terms: Terms { least, short_price, most, least_light: 0.0 },
         most_of_dark: if options.objective == VoxelObjective::Wrong { most } else { 0.0 },
         levels: Levels::new(light, options.min_level),
         lights,

@@ -10,6 +10,7 @@ use lamp_planning::speed::{
     PartError, PartPages, SpeedOptions, SpeedPlan, SpeedPlanError, TimedPart, plan, recorded_ms,
     times_table,
 };
+use lamp_planning::voxels::DOSE_MARGIN;
 use lamp_stack::Layer;
 
 use super::speed_plot::plots_of;
@@ -22,8 +23,8 @@ use crate::kept_stack::KeptStack;
 use crate::output::endings::parse_table;
 use crate::output::json_report::ReportTo;
 use crate::streams::{
-    check_beside, check_not_input, input_name, layers_of, layers_of_input, progress, write_file,
-    write_layers,
+    check_beside, check_not_input, input_name, layers_of, layers_of_input, progress, unless_found,
+    write_file, write_layers,
 };
 use crate::terminal::progress::Progress;
 use lamp_plots as plots;
@@ -66,6 +67,10 @@ pub(crate) struct SpeedArgs {
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     pub(crate) memory: Option<u64>,
 
+    /// Fail (status 3) and write no stack if the plan cures no voxel of the part
+    #[arg(long)]
+    strict: bool,
+
     #[command(flatten)]
     output: Output,
 }
@@ -73,7 +78,11 @@ pub(crate) struct SpeedArgs {
 pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     args.check_outputs()?;
     let progress = progress("plan", common, &args.output);
-    args.plan(&progress, |layers| write_layers(layers, &args.output, &progress))
+    args.plan(&progress, |layers, plan| {
+        let layers =
+            unless_found(layers, || args.finding(plan).filter(|_| args.strict).map(Exit::Findings));
+        write_layers(layers, &args.output, &progress)
+    })
 }
 
 impl SpeedArgs {
@@ -84,13 +93,13 @@ impl SpeedArgs {
     pub(crate) fn plan(
         &self,
         progress: &Progress,
-        write: impl FnOnce(&mut LayersOf<'_, Exit>) -> Result<(), Exit>,
+        write: impl FnOnce(&mut LayersOf<'_, Exit>, &SpeedPlan) -> Result<(), Exit>,
     ) -> Result<(), Exit> {
         let PlannedResin { material, light, doubt, words } = self.planning.resin()?;
         let options = SpeedOptions {
             light,
             platform: self.platform.platform(),
-            margin: self.planning.dose_margin,
+            margin: self.planning.dose_margin.unwrap_or(DOSE_MARGIN),
             gap: self.planning.search_gap,
             memory: self.memory.unwrap_or_else(|| memory::available() / 4),
         };
@@ -100,7 +109,11 @@ impl SpeedArgs {
         let plan =
             plan(&part, &options).map_err(|error: SpeedPlanError| Exit::from(error).at(name))?;
         let planned = PlannedTimes { material: &material.name, part: &part, plan: &plan };
-        write(&mut self.timed(&mut stack, &plan, self.command(&words))?)?;
+        let written = write(&mut self.timed(&mut stack, &plan, self.command(&words))?, &plan);
+        // After a finding, report and plots still show the plan.
+        if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
+            return written;
+        }
         let doses = MeasuredDoses::of_working_curve(&material);
         if let Some(light) = material.light().map_err(anyhow::Error::new)? {
             plan.times.iter().for_each(|&time| doses.see(light * time));
@@ -113,13 +126,27 @@ impl SpeedArgs {
             write_file(path, |out| out.write_all(times_table(&part, &plan.times).as_bytes()))?;
         }
         if let Some(path) = self.report.path() {
-            write_report(&planned, self.planning.dose_margin, path)?;
+            write_report(&planned, options.margin, path)?;
         }
         if let Some(path) = &self.plot {
             let bytes = plots::drawn(&plots_of(&planned), path)?;
             write_file(path, |out| out.write_all(&bytes))?;
         }
-        Ok(())
+        if let Some(doubt) = self.finding(&plan).filter(|_| !self.strict) {
+            progress.warn(&doubt);
+        }
+        written
+    }
+
+    /// Returns why the plan is of no use, if it is.
+    fn finding(&self, plan: &SpeedPlan) -> Option<String> {
+        plan.after.cures_nothing().then(|| {
+            format!(
+                "{}: the plan cures no voxel of the part: even the slowest platform gives too little \
+                 light; allow a slower --speed",
+                input_name(&self.input.stack)
+            )
+        })
     }
 
     /// Returns the options that matter to bytes as one text; the digest of a material's file is not
@@ -179,7 +206,7 @@ impl SpeedArgs {
         let PlanningOptions { wanted, dose_margin, search_gap, dose_at, .. } = &self.planning;
         format!(
             "lamp plan speed {resin} --wanted {wanted} --dose-margin {}% --search-gap {}% --dose-at {dose_at}{}",
-            100.0 * dose_margin,
+            100.0 * dose_margin.unwrap_or(DOSE_MARGIN),
             100.0 * search_gap,
             self.platform.words()
         )

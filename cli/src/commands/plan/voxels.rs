@@ -70,7 +70,7 @@ pub(crate) struct VoxelsArgs {
     #[arg(long, value_name = "PIXELS", value_parser = parse_around)]
     around: Option<u32>,
 
-    /// Exposure time of pages that state none
+    /// Exposure time of all pages, in place of their own
     #[arg(long, value_name = "TIME", value_parser = parse_exposure)]
     pub(crate) expose: Option<ExposureTime>,
 
@@ -99,6 +99,8 @@ pub(crate) struct VoxelsArgs {
     #[command(flatten)]
     output: Output,
 }
+
+const NOTHING_CURED: &str = "the plan cures no wanted voxel: expose longer, or keep what white light cures by --objective boundary";
 
 /// Returns the pixels of `3px`, which are some.
 fn parse_pixels(text: &str) -> Option<u32> {
@@ -204,7 +206,7 @@ impl VoxelsArgs {
         let planned = PlannedVoxels {
             material: &material.name,
             objective: self.objective,
-            margin: self.planning.dose_margin,
+            margin: self.options().margin(),
             outcome: &planned.outcome(),
         };
         let doubts = doubt.into_iter().chain(doses.doubt("layers"));
@@ -220,6 +222,9 @@ impl VoxelsArgs {
         }
         if let Some((path, bytes)) = map.drawn()? {
             write_file(path, |out| out.write_all(&bytes))?;
+        }
+        if planned.outcome.cures_nothing() && !self.strict {
+            progress.warn(&format!("{}: {NOTHING_CURED}", input_name(&self.input.stack)));
         }
         written
     }
@@ -269,11 +274,11 @@ impl VoxelsArgs {
 
     /// The command, as pages record it.
     fn command(&self, resin: &str) -> String {
-        let PlanningOptions { wanted, dose_margin, search_gap, dose_at, .. } = &self.planning;
+        let PlanningOptions { wanted, search_gap, dose_at, .. } = &self.planning;
         let mut command = format!(
             "lamp plan voxels {resin} --objective {} --wanted {wanted} --dose-margin {}% --search-gap {}% --dose-at {dose_at}",
             self.objective,
-            100.0 * dose_margin,
+            100.0 * self.options().margin(),
             100.0 * search_gap
         );
         match self.sources {
@@ -293,10 +298,10 @@ impl VoxelsArgs {
         command
     }
 
-    /// Gives a page its exposure, if it states none, and records the command.
+    /// Gives a page the exposure of the options, if there is one, and records the command.
     fn prepared(&self, mut layer: Layer, command: &str) -> Layer {
         let given = self.expose.map(ExposureTime::ms);
-        layer.info.exposure_ms = layer.info.exposure_ms.or(given);
+        layer.info.exposure_ms = given.or(layer.info.exposure_ms);
         if let Some(stack) = &mut layer.info.stack {
             stack.commands.push(command.to_owned());
         }
@@ -311,11 +316,12 @@ impl VoxelsArgs {
 
     /// Returns what `--strict` finds.
     fn finding(&self, outcome: &Outcome) -> Option<Exit> {
+        let name = || input_name(&self.input.stack);
         let found = match outcome.uncurable() {
+            0 if outcome.cures_nothing() => Some(format!("{}: {NOTHING_CURED}", name())),
             0 => doubts(),
             uncurable => {
-                let name = input_name(&self.input.stack);
-                Some(format!("{name}: white light cannot cure {uncurable} wanted voxels"))
+                Some(format!("{}: white light cannot cure {uncurable} wanted voxels", name()))
             }
         };
         found.filter(|_| self.strict).map(Exit::Findings)
