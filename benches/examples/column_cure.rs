@@ -10,7 +10,9 @@
 
 use std::path::Path;
 
-use lamp_planning::column::{GlassLight, MirrorSpread, Setup, Stop, Tracing, nearest_times};
+use lamp_planning::column::{
+    Allowed, GlassLight, MirrorSpread, Setup, Stop, Tracing, nearest_times,
+};
 
 /// From one mirror to the next on the glass, in um (000: 13.65 um at 132/152).
 const PITCH_UM: f64 = 11.85;
@@ -40,8 +42,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             write_matrix(folder, &light)?;
         }
         _ => {
+            let allowed = Allowed { max_s: LONGEST, evenness: 0.0 };
             let stop = Stop { gap: 1e-4, steps: 100_000 };
-            let times = nearest_times(&light, &wanted, LONGEST, &[0.0], stop, &|| false);
+            let times = nearest_times(&light, &wanted, allowed, &[0.0], stop, &|| false);
             println!("{} steps", times.steps);
             write(&folder.join("times"), &times.seconds)?;
         }

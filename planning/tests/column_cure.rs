@@ -4,10 +4,10 @@ use std::cell::Cell;
 
 use lamp_grayscale::material::Material;
 use lamp_planning::column::{
-    ColumnError, ColumnObjective, ColumnOptions, GlassLight, HeightCurve, Measures, MirrorSpread,
-    Setup, Stop, Tracing, plan,
+    ColumnError, ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Measures,
+    MirrorSpread, Setup, Stop, Tracing, plan,
 };
-use lamp_planning::target::{Grid, HeightMap, Target};
+use lamp_planning::target::{Grid, HeightMap, Shapes, Target};
 use lamp_stack::{Catalogued, Image, Length, Mask};
 
 const RAYS: Tracing = Tracing::Rays { points: 9, directions: 15 };
@@ -45,6 +45,7 @@ fn options(objective: ColumnObjective) -> ColumnOptions {
         bitmaps: 25,
         fewer: false,
         gray: None,
+        dose_error: 0.0,
         max_s: 600.0,
         robust: Length::default(),
         step_s: 1e-3,
@@ -108,6 +109,52 @@ fn five_gray_bitmaps_are_as_good_as_any_times() {
     // um.
     let white = plan(&light, &target, pegda(), &five, || false).unwrap();
     assert!(measures(&white.doses, &target).ra_um < 15.2);
+}
+
+/// Where light spreads over four mirrors, the nearest times are scattered and long.
+#[test]
+fn even_times_are_short_and_nearly_as_near() {
+    let pitch_um = 10.0;
+    let light = GlassLight::new(Setup {
+        mirrors: [72; 2],
+        display: [72; 2],
+        pitch_um,
+        lit_um: pitch_um,
+        spread: MirrorSpread::Gaussian(4.0 * pitch_um),
+        tracing: Tracing::Exact,
+        irradiance: 2.5,
+        flat_field: Vec::new(),
+        voxels: [64; 2],
+        voxel_um: 10.0,
+    });
+    let lens = Shapes::from_toml(
+        "name = 'lens'\ndescription = ''\n[[lens]]\ndiameter = '300 um'\nsag = '60 um'",
+    );
+    let grid = Grid { columns: 64, rows: 64, pitch_um: 10.0 };
+    let target = Target::from(lens.unwrap()).heights(&grid).unwrap();
+    let planned = |dose_error| {
+        let options = ColumnOptions {
+            dose_error,
+            fewer: true,
+            stop: Stop { gap: 1e-3, steps: 5_000 },
+            max_s: 60.0,
+            ..options(ColumnObjective::Dose)
+        };
+        plan(&light, &target, pegda(), &options, || false).unwrap()
+    };
+    let (any, even) = (planned(0.0), planned(0.03));
+    let longest = |plan: &ColumnPlan| plan.best.seconds.iter().copied().fold(0.0, f64::max);
+    // A wide field cures the highest column in 5.6 s.
+    assert!(longest(&any) > 59.9 && longest(&even) < 30.0, "{} {}", longest(&any), longest(&even));
+    let cost = even.best.error / any.best.error - 1.0;
+    assert!(
+        cost < 0.03 && cost * any.best.error <= even.best.price,
+        "{cost} {:?}",
+        even.best.price
+    );
+    let rms = |plan: &ColumnPlan| measures(&plan.best_doses, &target).rms_um;
+    assert!(rms(&even) < 1.02 * rms(&any), "{} {}", rms(&even), rms(&any));
+    assert!(even.best.steps < any.best.steps, "{} {}", even.best.steps, any.best.steps);
 }
 
 #[test]

@@ -37,6 +37,7 @@ fn planned(of: &Columns) -> ColumnLight {
         fewer: true,
         gray: None,
         max_s: 4.0 * flood,
+        dose_error: 0.0,
         robust: Length::default(),
         step_s: 1e-3,
         stop: Stop { gap: 1e-4, steps: 2000 },

@@ -106,7 +106,7 @@ fn what_cannot_be_planned_is_refused_in_a_sentence() {
         scratch.run(&format!("{LENSES} {options}")).is_refused_with(words);
         assert!(!scratch.path("plan").exists(), "{options}");
     };
-    refused("--bitmaps 1000 --max-time 500ms", &["longer than 0.5 s", "allow more"]);
+    refused("--bitmaps 1000 --max-time 500ms", &["more than the mirrors have distinct times"]);
     refused("--voxel 0.1um", &["too many"]);
     refused("--voxel 10mm", &["columns of 10000 um are wider than a mirror's 27.88 um"]);
     refused("--rays 1x1", &["no ray reaches column", "count more rays"]);

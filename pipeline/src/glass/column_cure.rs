@@ -30,6 +30,8 @@ use crate::words::{option, optional, optional_path, path, text};
 
 /// Bitmaps where none are asked for, as in 000.
 const BITMAPS: usize = 25;
+/// The share to which doses are known where the material does not say it.
+const DOSE_ERROR: f64 = 0.03;
 /// No resin is exposed for longer.
 const A_DAY_S: f64 = 86_400.0;
 /// Steps after which a search ends, however near it is.
@@ -56,10 +58,14 @@ pub struct ColumnCureSettings {
     /// The quantity to bring nearest to the target's.
     #[serde(with = "text")]
     pub optimize: ColumnObjective,
-    /// The longest time of a mirror; `None` is four times the flood exposure time of the highest
+    /// The longest time of a mirror; `None` is three times the flood exposure time of the highest
     /// column.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub max_time: Option<LongestTime>,
+    /// The share by which doses may be off where that makes times shorter and more even; `None` is what
+    /// the material's `plus-minus` allows, or 3%.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub dose_error: Option<DoseError>,
     /// How far the glass may be off along each axis.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub robust: Option<Length>,
@@ -117,6 +123,27 @@ impl FromStr for LongestTime {
 impl fmt::Display for LongestTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
+    }
+}
+
+/// A share of a dose, below 100%.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DoseError(f64);
+
+impl FromStr for DoseError {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match parse_share(text)? {
+            share if share < 1.0 => Ok(Self(share)),
+            _ => Err(format!("`{text}` is not below 100%: write 3%")),
+        }
+    }
+}
+
+impl fmt::Display for DoseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.2}%", 100.0 * self.0)
     }
 }
 
@@ -234,7 +261,7 @@ impl ColumnCureSettings {
         if let Some(text) = unmeasured_heights(&wanted, &curve, &material) {
             watcher.remark(Remark::warning(text));
         }
-        let options = self.options(&projector, &wanted, &curve)?;
+        let options = self.options(&projector, &material, &wanted, &curve)?;
         let plan = plan(&light, &wanted, curve, &options, || watcher.is_stopped())
             .map_err(|error| of_work(error).at(self.target.given()))?;
         let cure = ColumnCure {
@@ -307,6 +334,7 @@ impl ColumnCureSettings {
     fn options(
         &self,
         projector: &Projector,
+        material: &Material,
         wanted: &HeightMap,
         curve: &HeightCurve,
     ) -> Result<ColumnOptions, Error> {
@@ -337,13 +365,18 @@ impl ColumnCureSettings {
             fewer: self.bitmaps.is_none(),
             gray: self.gray.then(|| Box::new(shares)),
             max_s,
+            dose_error: match self.dose_error {
+                Some(DoseError(share)) => share,
+                None => HeightCurve::dose_deviation(material, wanted.highest_um())
+                    .map_or(DOSE_ERROR, |share| share.min(0.1)),
+            },
             robust: self.robust.unwrap_or_default(),
             step_s: projector.step.value.ms() / 1000.0,
             stop: Stop { gap: self.search_gap.0, steps: MOST_STEPS },
         })
     }
 
-    /// Four times what a wide white field takes for the highest column.
+    /// Three times what a wide white field takes for the highest column.
     fn usual_max_s(
         &self,
         projector: &Projector,
@@ -360,7 +393,7 @@ impl ColumnCureSettings {
                 "{name}: a column of {highest} takes more than a day of white light"
             )));
         }
-        Ok((4.0 * wide_s).min(A_DAY_S))
+        Ok((3.0 * wide_s).min(A_DAY_S))
     }
 
     /// The command, as the bitmaps record it.
@@ -374,13 +407,14 @@ impl ColumnCureSettings {
         // Values that were used, not given: defaults may change, and the command must not.
         let mut command = format!(
             "lamp plan column-cure {} --projector {} --material {} --bitmaps {} --optimize {} \
-             --max-time {:.3}s --search-gap {}",
+             --max-time {:.3}s --dose-error {} --search-gap {}",
             quoted(target),
             quoted(projector),
             quoted(material),
             options.bitmaps,
             self.optimize,
             options.max_s,
+            DoseError(options.dose_error),
             self.search_gap
         );
         if self.gray {
@@ -437,8 +471,9 @@ impl ColumnCure {
             )
         });
         let at_max = best.at_most(options.max_s);
-        let held = (at_max > 0)
-            .then(|| format!("{at_max} mirrors need more than --max-time {:.3}s", options.max_s));
+        let held = (at_max > 0).then(|| {
+            format!("{at_max} mirrors are on for all of --max-time {:.3}s", options.max_s)
+        });
         late.into_iter().chain(held).collect()
     }
 }

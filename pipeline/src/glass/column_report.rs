@@ -42,6 +42,8 @@ pub struct ColumnCureReport<'a> {
     irradiance_mw_per_cm2: f64,
     /// Longest time of a mirror, in seconds, by `--max-time`.
     max_time_s: f64,
+    /// Share by which doses may be off for shorter and more even times, by `--dose-error`.
+    dose_error: f64,
     /// Mirrors held at the longest time.
     mirrors_at_max_time: usize,
     /// Unit of `error` and `gap`: half sums of squares of doses or heights.
@@ -62,10 +64,14 @@ pub struct ColumnCureReport<'a> {
 struct BestReport {
     /// Its error.
     error: f64,
-    /// The most by which its error is above the least possible one.
+    /// The most by which the sum of its error and `term` is above the least possible one.
     gap: f64,
-    /// The gap as a share of the error.
+    /// What short and even times add to the sum that is minimized.
+    term: f64,
+    /// The gap as a share of the sum.
     relative_gap: f64,
+    /// The most by which the error of any allowed times, however uneven, can be smaller.
+    price: f64,
     /// Steps of the search.
     steps: usize,
     /// Its measures.
@@ -123,9 +129,16 @@ impl ColumnCure {
             measures_line(&measures),
             format!(
                 "the bitmaps' error is {:.2}% above the error of the best times, which is within {:.1e} of \
-                 the least possible",
+                 the least possible{}",
                 100.0 * plan.excess(),
-                plan.best.relative_gap()
+                plan.best.relative_gap(),
+                match plan.best.price / plan.best.error {
+                    // A bound of as much as the error bounds nothing.
+                    share if self.options.dose_error > 0.0 && share < 1.0 => {
+                        format!(" with even times, and within {:.2}% with any", 100.0 * share)
+                    }
+                    _ => String::new(),
+                }
             ),
         ]
     }
@@ -192,11 +205,14 @@ pub(super) fn report_of(cure: &ColumnCure) -> ColumnCureReport<'_> {
         mirror_um: setup.pitch_um,
         irradiance_mw_per_cm2: setup.irradiance,
         max_time_s: options.max_s,
+        dose_error: options.dose_error,
         mirrors_at_max_time: plan.best.at_most(options.max_s),
         error_unit: unit,
         best: BestReport {
             error: plan.best.error,
             gap: plan.best.gap,
+            term: plan.best.term,
+            price: plan.best.price,
             relative_gap: plan.best.relative_gap(),
             steps: plan.best.steps,
             measures: cure.measured(&plan.best_doses),

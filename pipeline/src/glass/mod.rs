@@ -16,7 +16,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 pub use column_cure::{
-    BitmapCount, ColumnCure, ColumnCureSettings, LongestTime, PlanInputs, SearchGap,
+    BitmapCount, ColumnCure, ColumnCureSettings, DoseError, LongestTime, PlanInputs, SearchGap,
 };
 pub use column_job::{ColumnJob, ColumnJobPrint, ColumnLesson, is_column_job};
 pub use column_measures::{MeasuresReport, measures_line, measures_report, unmeasured_heights};

@@ -34,6 +34,21 @@ impl CurvatureMatrix for Normal<'_> {
     }
 }
 
+/// A matrix with a number added along its diagonal, which makes numbers small and even (A. N. Tikhonov,
+/// Soviet Math. Dokl. 4 (1963)).
+pub(super) struct Even<'a, C> {
+    pub(super) of: &'a C,
+    pub(super) evenness: f64,
+}
+
+impl<C: CurvatureMatrix> CurvatureMatrix for Even<'_, C> {
+    fn apply(&self, numbers: &[f64]) -> Vec<f64> {
+        let mut product = self.of.apply(numbers);
+        product.iter_mut().zip(numbers).for_each(|(out, number)| *out += self.evenness * number);
+        product
+    }
+}
+
 /// The sum of these products over some lights, with a weight for each column voxel.
 pub(super) struct Weighted<'a> {
     pub(super) lights: &'a [GlassLight],

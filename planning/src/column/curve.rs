@@ -1,7 +1,7 @@
 //! The height that a dose cures, and the dose of a height (000 eq. 3.9, 3.10).
 
-use lamp_grayscale::material::{Material, MaterialError};
-use lamp_grayscale::resin::{CureModel, DepthRange, Dose, TwoDepth};
+use lamp_grayscale::material::{Given, Material, MaterialError};
+use lamp_grayscale::resin::{CureModel, DepthRange, Dose, Quantity, TwoDepth};
 use lamp_stack::Length;
 use thiserror::Error;
 
@@ -29,6 +29,16 @@ pub enum NoHeights {
     Numbers(#[from] MaterialError),
 }
 
+/// Half of a 95% interval, in standard deviations.
+const OF_95_PERCENT: f64 = 1.96;
+
+/// Raises a number by its standard deviation. Returns whether it states one.
+fn raise<T: Quantity>(given: &mut Given<T>) -> bool {
+    let Some(half) = given.plus_minus else { return false };
+    given.value = T::of(given.value.number() + half.number() / OF_95_PERCENT);
+    true
+}
+
 impl HeightCurve {
     /// Returns the curve of a material: its `[two-depth]`, or its `[working-curve]`, which is the
     /// same with one penetration depth.
@@ -53,6 +63,29 @@ impl HeightCurve {
     /// no dose cures it.
     pub fn dose(&self, height_um: f64) -> Option<f64> {
         self.model.dose(Length::from_um(height_um)).ok().map(Dose::mj_per_cm2)
+    }
+
+    /// Returns the standard deviation of the dose that cures a height in um, as a share of the dose, by
+    /// the `plus-minus` of the material's critical dose and depth; `None` if it states neither.
+    pub fn dose_deviation(material: &Material, height_um: f64) -> Option<f64> {
+        let dose = |material: &Material| Self::of(material).ok()?.dose(height_um);
+        let mut raised = [material.clone(), material.clone()];
+        let [critical, depth] = &mut raised;
+        let states = match (&mut critical.two_depth, &mut depth.two_depth) {
+            (Some(one), Some(other)) => {
+                [raise(&mut one.critical_dose), raise(&mut other.liquid_depth)]
+            }
+            _ => [
+                critical.working_curve.as_mut().is_some_and(|it| raise(&mut it.critical_dose)),
+                depth.working_curve.as_mut().is_some_and(|it| raise(&mut it.penetration_depth)),
+            ],
+        };
+        if states == [false; 2] {
+            return None;
+        }
+        let here = dose(material)?;
+        let [one, other] = raised.map(|raised| dose(&raised).map(|dose| (dose / here).ln()));
+        Some(one?.hypot(other?))
     }
 
     /// Returns the critical dose, in mJ/cm2.

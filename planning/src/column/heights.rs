@@ -1,9 +1,9 @@
 //! Times whose cured heights are nearest to the target's (000 section 4.5.2).
 
-use super::curvature::Weighted;
+use super::curvature::{Even, Weighted};
 use super::curve::HeightCurve;
 use super::light::GlassLight;
-use super::times::{MirrorTimes, Stop, frank_wolfe_gap};
+use super::times::{Allowed, MirrorTimes, Stop, frank_wolfe_gap};
 use crate::numeric::{Bounded, SearchPlace};
 
 /// The difference between cured and wanted heights, in um, on lights that count equally.
@@ -61,23 +61,26 @@ impl HeightMisfit<'_> {
     }
 }
 
-/// Finds the times, at most `max_s` seconds, whose heights are nearest to the target's: Newton's
-/// method, which minimizes its squares as squares of doses are. The search also ends once
-/// `is_stopped` returns true.
+/// Finds the allowed times whose heights are nearest to the target's: Newton's method, which minimizes
+/// its squares as squares of doses are. The search also ends once `is_stopped` returns true.
 pub(super) fn nearest_heights(
     error: &HeightMisfit<'_>,
-    max_s: f64,
+    allowed: Allowed,
     stop: Stop,
     is_stopped: &dyn Fn() -> bool,
 ) -> MirrorTimes {
     let mirrors = error.lights[0].setup().mirrors.iter().product();
+    let Allowed { max_s, evenness } = allowed;
+    let term = |x: &[f64]| 0.5 * evenness * x.iter().map(|time| time * time).sum::<f64>();
     let mut x = vec![0.0; mirrors];
     let mut squares = error.all_squares(&x);
     let mut steps = 0;
     loop {
-        let value: f64 = squares.iter().map(|squares| squares.error).sum();
+        let error_here: f64 = squares.iter().map(|squares| squares.error).sum();
+        let value = error_here + term(&x);
         let weights: Vec<_> = squares.iter().map(|squares| squares.weights.as_slice()).collect();
         let curvature = Weighted { lights: error.lights, weights: &weights };
+        let curvature = Even { of: &curvature, evenness };
         let mut pull = vec![0.0; mirrors];
         for (light, squares) in error.lights.iter().zip(&squares) {
             let weighed = squares.wanted.iter().zip(&squares.weights).map(|(want, by)| want * by);
@@ -88,7 +91,7 @@ pub(super) fn nearest_heights(
         let here = problem.place(x);
         let gap = frank_wolfe_gap(&here, max_s);
         if gap <= stop.gap * value || steps >= stop.steps || is_stopped() {
-            return MirrorTimes { seconds: here.x, error: value, gap, steps };
+            return MirrorTimes::of(here, error_here, allowed, steps);
         }
         // A step that leaves less than a tenth of the gap gains nothing: the squares change with
         // it.
@@ -98,7 +101,7 @@ pub(super) fn nearest_heights(
             steps = before + step;
             frank_wolfe_gap(place, max_s) <= enough || steps >= stop.steps || is_stopped()
         });
-        (x, squares) = nearer(error, &here, &next.x, value);
+        (x, squares) = nearer(error, &term, &here, &next.x, value);
         steps += 1;
     }
 }
@@ -106,6 +109,7 @@ pub(super) fn nearest_heights(
 /// Goes to `next`, or a share of the way there for which the error falls.
 fn nearer(
     error: &HeightMisfit<'_>,
+    term: &impl Fn(&[f64]) -> f64,
     here: &SearchPlace,
     next: &[f64],
     value: f64,
@@ -115,7 +119,7 @@ fn nearer(
         let between = here.x.iter().zip(next).map(|(from, to)| from + share * (to - from));
         let x: Vec<_> = between.collect();
         let squares = error.all_squares(&x);
-        let there: f64 = squares.iter().map(|squares| squares.error).sum();
+        let there = squares.iter().map(|squares| squares.error).sum::<f64>() + term(&x);
         // Steps as small as rounding may not lower the error any more.
         if there <= value || share < 1e-3 {
             return (x, squares);

@@ -21,4 +21,4 @@ pub use light::{GlassLight, GridError, Setup};
 pub use measures::Measures;
 pub use plan::{ColumnError, ColumnObjective, ColumnOptions, ColumnPlan, plan};
 pub use spread::{MirrorSpread, NoTracing, Tracing};
-pub use times::{MirrorTimes, Stop, nearest_times};
+pub use times::{Allowed, MirrorTimes, Stop, nearest_times};

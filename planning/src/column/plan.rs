@@ -10,7 +10,7 @@ use super::heights::{HeightMisfit, nearest_heights};
 use super::levels::{WantedDoses, best_seconds};
 use super::light::GlassLight;
 use super::spread::Tracing;
-use super::times::{MirrorTimes, Stop, nearest_times};
+use super::times::{Allowed, MirrorTimes, Stop, nearest_times};
 use crate::target::{HeightMap, Place};
 
 /// The quantity that should be nearest to the target's.
@@ -38,6 +38,9 @@ pub struct ColumnOptions {
     pub gray: Option<Box<[f64; 256]>>,
     /// The longest time for which a mirror may be on, in seconds.
     pub max_s: f64,
+    /// The share by which doses may be off where that makes times shorter and more even: the standard
+    /// deviation to which the dose that a height needs is known. 0 asks for the nearest doses alone.
+    pub dose_error: f64,
     /// The distance by which the glass may be displaced along each axis: errors are means over no
     /// displacement and this displacement in both directions.
     pub robust: Length,
@@ -63,17 +66,6 @@ pub enum ColumnError {
     /// More bitmaps than there are times.
     #[error(transparent)]
     TooFewTimes(#[from] TooFewTimes),
-    /// The longest time is too short.
-    #[error(
-        "{mirrors} mirrors would have to be on for longer than {max_s} s, the longest time that is \
-         allowed: allow more"
-    )]
-    MaxTime {
-        /// The number of mirrors that are on for all of it.
-        mirrors: usize,
-        /// The longest time, in seconds.
-        max_s: f64,
-    },
     /// All times are shorter than the display can show.
     #[error(
         "the longest time, {:.3} ms, is under the display's step of {:.3} ms: less light, or a \
@@ -94,7 +86,7 @@ pub enum ColumnError {
 #[derive(Clone, Debug)]
 pub struct ColumnPlan {
     /// The times without clusters. No bitmaps can have an error smaller than theirs by more than
-    /// their gap.
+    /// their price.
     pub best: MirrorTimes,
     /// Doses of the best times, in mJ/cm2.
     pub best_doses: Vec<f64>,
@@ -197,15 +189,36 @@ impl<'a> ColumnProblem<'a> {
 
     fn best_times(&self, is_stopped: &dyn Fn() -> bool) -> MirrorTimes {
         let ColumnOptions { objective, max_s, stop, .. } = *self.options;
+        let allowed = Allowed { max_s, evenness: self.evenness() };
         match objective {
             ColumnObjective::Dose => {
                 let shifts_um = self.options.shifts_um();
-                nearest_times(self.light, &self.wanted, max_s, &shifts_um, stop, is_stopped)
+                nearest_times(self.light, &self.wanted, allowed, &shifts_um, stop, is_stopped)
             }
             ColumnObjective::Height => {
-                nearest_heights(&self.height_error(), max_s, stop, is_stopped)
+                nearest_heights(&self.height_error(), allowed, stop, is_stopped)
             }
         }
+    }
+
+    /// Returns the weight of half the squared times against half the squared errors.
+    ///
+    /// The times are the most probable ones if the wanted doses E are known to a share s of a dose, and
+    /// times are around T, the time in which a wide field gives it: |H t - E|²/(s I T)² + n |t|²/T², where
+    /// n is the number of columns to a mirror, so that finer columns change nothing. In heights, the
+    /// difference of a dose counts by the curve's slope at that dose.
+    fn evenness(&self) -> f64 {
+        let setup = self.light.setup();
+        let columns = (setup.pitch_um / setup.voxel_um).powi(2);
+        let dose = self.options.dose_error * setup.irradiance;
+        let slope = match self.options.objective {
+            ColumnObjective::Dose => 1.0,
+            ColumnObjective::Height => {
+                let highest = self.wanted.iter().copied().fold(0.0, f64::max);
+                self.curve.straight_below(highest).1
+            }
+        };
+        columns * (dose * slope).powi(2)
     }
 
     /// Returns the bitmaps for the times, and the number of steps for which each mirror is on.
@@ -214,7 +227,7 @@ impl<'a> ColumnProblem<'a> {
         let mirrors = Mirrors { count: setup.mirrors, display: setup.display };
         let times: Vec<_> = best.seconds.iter().map(|s| s / self.options.step_s).collect();
         let whole: Vec<_> = times.iter().map(|steps| steps.round() as u64).collect();
-        let clusters = self.clusters(best, &whole)?;
+        let clusters = self.clusters(&whole)?;
         if let Some(shares) = &self.options.gray {
             return Ok(gray(mirrors, &times, &clusters, shares));
         }
@@ -234,21 +247,13 @@ impl<'a> ColumnProblem<'a> {
     }
 
     /// Returns the clusters of times in steps.
-    fn clusters(&self, best: &MirrorTimes, steps: &[u64]) -> Result<Clusters, ColumnError> {
-        let ColumnOptions { bitmaps, fewer, max_s, .. } = *self.options;
-        let too_few = match Clusters::of(steps, bitmaps) {
-            Ok(clusters) => return Ok(clusters),
-            Err(too_few) => too_few,
-        };
-        let mirrors = best.at_most(max_s);
-        // Where most mirrors are at the longest time, times are equal because of that limit, not
-        // because of the part.
-        if 2 * mirrors > steps.iter().filter(|steps| **steps > 0).count() {
-            return Err(ColumnError::MaxTime { mirrors, max_s });
-        }
-        match too_few.distinct {
-            distinct @ 1.. if fewer => Ok(Clusters::of(steps, distinct)?),
-            _ => Err(too_few.into()),
+    fn clusters(&self, steps: &[u64]) -> Result<Clusters, ColumnError> {
+        let ColumnOptions { bitmaps, fewer, .. } = *self.options;
+        match Clusters::of(steps, bitmaps) {
+            Err(TooFewTimes { distinct: distinct @ 1.., .. }) if fewer => {
+                Ok(Clusters::of(steps, distinct)?)
+            }
+            clusters => Ok(clusters?),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::curvature::Normal;
+use super::curvature::{Even, Normal};
 use super::light::GlassLight;
 use crate::numeric::{Bounded, SearchPlace};
 
@@ -15,24 +15,50 @@ pub struct Stop {
     pub steps: usize,
 }
 
+/// The times that a search allows, and those that it prefers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Allowed {
+    /// The longest time of a mirror, in seconds.
+    pub max_s: f64,
+    /// The error that half of the sum of the squared times adds, for each s². Where light spreads over
+    /// many mirrors, doses nearly do not depend on which of them are on, and without it the nearest
+    /// times are scattered and long.
+    pub evenness: f64,
+}
+
 /// The seconds for which mirrors are on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MirrorTimes {
     /// The time of each mirror, rows from the first.
     pub seconds: Vec<f64>,
-    /// The error that was minimized: half the sum of the squared differences between doses and
-    /// wanted doses, in (mJ/cm2)2.
+    /// Half the sum of the squared differences between doses and wanted doses, in (mJ/cm2)2.
     pub error: f64,
-    /// The most by which the least error can be smaller: the Frank-Wolfe gap.
+    /// The value of the term of [`Allowed::evenness`]: a search minimizes its sum with the error.
+    pub term: f64,
+    /// The most by which the least sum can be smaller: the Frank-Wolfe gap.
     pub gap: f64,
+    /// The most by which the least error of any allowed times, however uneven, can be smaller.
+    pub price: f64,
     /// The number of steps of the search.
     pub steps: usize,
 }
 
 impl MirrorTimes {
-    /// Returns the gap as a share of the error, or 0 if there is no error.
+    /// Returns the gap as a share of the sum that was minimized, or 0 if there is no gap.
     pub fn relative_gap(&self) -> f64 {
-        if self.gap > 0.0 { self.gap / self.error } else { 0.0 }
+        if self.gap > 0.0 { self.gap / (self.error + self.term) } else { 0.0 }
+    }
+
+    /// Creates them from where a search of the sum ended.
+    pub(super) fn of(place: SearchPlace, error: f64, allowed: Allowed, steps: usize) -> Self {
+        let Allowed { max_s, evenness } = allowed;
+        let gap = frank_wolfe_gap(&place, max_s);
+        let term = 0.5 * evenness * place.x.iter().map(|time| time * time).sum::<f64>();
+        let SearchPlace { x, mut slopes } = place;
+        slopes.iter_mut().zip(&x).for_each(|(slope, time)| *slope -= evenness * time);
+        let plain = SearchPlace { x, slopes };
+        let price = if evenness > 0.0 { frank_wolfe_gap(&plain, max_s) } else { gap };
+        Self { error, term, gap, price, steps, seconds: plain.x }
     }
 
     /// Returns the number of mirrors that are on for the longest time.
@@ -54,37 +80,59 @@ pub(super) fn frank_wolfe_gap(place: &SearchPlace, high: f64) -> f64 {
     numbers.map(of_chunk).collect::<Vec<_>>().into_iter().sum()
 }
 
+/// Steps towards the nearest times, uneven as they may be, and the share of the error that is near
+/// enough.
+const STEPS_TO_PRICE: usize = 48;
+const NEAR: f64 = 1e-3;
+
 /// An error below this share of the error without light counts as zero.
 const NOTHING: f64 = 1e-12;
 
-/// Finds the times, at most `max_s` seconds, whose doses are nearest to `wanted` in mJ/cm2: the
-/// least half sum of squares (000 eq. 4.4), or its mean over lights shifted by `shifts_um` along
-/// each axis. The search also ends once `is_stopped` returns true.
+/// Finds the allowed times whose doses are nearest to `wanted` in mJ/cm2: the least half sum of squares
+/// (000 eq. 4.4), or its mean over lights shifted by `shifts_um` along each axis, with the term of
+/// [`Allowed::evenness`]. The search also ends once `is_stopped` returns true.
 pub fn nearest_times(
     light: &GlassLight,
     wanted: &[f64],
-    max_s: f64,
+    allowed: Allowed,
     shifts_um: &[f64],
     stop: Stop,
     is_stopped: &dyn Fn() -> bool,
 ) -> MirrorTimes {
-    let curvature = Normal::mean(light, shifts_um);
+    let Allowed { max_s, evenness } = allowed;
+    let normal = Normal::mean(light, shifts_um);
+    let curvature = Even { of: &normal, evenness };
     let pull = mean_pull(light, wanted, shifts_um);
     let problem = Bounded { curvature: &curvature, pull: &pull, high: max_s };
     // |H t - E|² / 2 = t HᵀH t / 2 - t HᵀE + E E / 2 (000 eq. 4.4, squared): the search needs only
     // the first two terms.
     let dark = 0.5 * wanted.iter().map(|dose| dose * dose).sum::<f64>();
-    let error = |place: &SearchPlace| dark + fall(place, &pull);
-    let (mut steps, mut gap) = (0, f64::INFINITY);
+    let sum = |place: &SearchPlace| dark + fall(place, &pull);
+    let mut steps = 0;
     let place = problem.search(vec![0.0; pull.len()], 8, |place, step| {
-        (steps, gap) = (step, frank_wolfe_gap(place, max_s));
-        let is_near = gap <= stop.gap * error(place).max(NOTHING * dark);
+        steps = step;
+        let gap = frank_wolfe_gap(place, max_s);
+        let is_near = gap <= stop.gap * sum(place).max(NOTHING * dark);
         is_near || step >= stop.steps || is_stopped()
     });
     // Slopes summed over steps carry rounding errors: the proof uses newly computed ones.
     let place = problem.place(place.x);
-    let gap = frank_wolfe_gap(&place, max_s);
-    MirrorTimes { error: error(&place).max(0.0), gap, steps, seconds: place.x }
+    let sum = sum(&place);
+    let mut times = MirrorTimes::of(place, 0.0, allowed, steps);
+    times.error = (sum - times.term).max(0.0);
+    if evenness > 0.0 {
+        // A few steps towards the nearest times alone: wherever they end, their bound holds, and mostly it
+        // is nearer than the bound of the even times.
+        let plain = Bounded { curvature: &normal, pull: &pull, high: max_s };
+        let place = plain.search(times.seconds.clone(), 8, |place, step| {
+            let gap = frank_wolfe_gap(place, max_s);
+            gap <= NEAR * times.error || step >= STEPS_TO_PRICE || is_stopped()
+        });
+        let place = plain.place(place.x);
+        let least = dark + fall(&place, &pull) - frank_wolfe_gap(&place, max_s);
+        times.price = times.price.min(times.error - least).max(0.0);
+    }
+    times
 }
 
 /// Returns the mean over shifts of H's transpose times the doses.

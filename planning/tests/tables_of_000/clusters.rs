@@ -7,7 +7,7 @@ use lamp_stack::Image;
 use proptest::prelude::*;
 
 use super::times::least_error;
-use super::zhao::{Part, options, pegda, zhao};
+use super::zhao::{ALLOWED, Part, options, pegda, zhao};
 
 /// The least sum of squares of this number of clusters and one at zero, by trying all.
 fn least_squares(times: &[u64], clusters: usize) -> f64 {
@@ -79,7 +79,7 @@ fn no_other_times_of_the_bitmaps_are_better() {
         let planned = plan(&light, &part.map, pegda(), &fine, || false).unwrap();
         let columns = of_bitmaps(&light, &planned);
         assert_eq!(columns.len(), bitmaps);
-        let least = least_error(&columns, &part.doses, 600.0);
+        let least = least_error(&columns, &part.doses, ALLOWED);
         assert!((planned.error / least - 1.0).abs() < 1e-6, "{} for {least}", planned.error);
         let found = planned.excess() * planned.best.error;
         assert!((found - (least - planned.best.error)).abs() < 1e-3 * least, "{found}");

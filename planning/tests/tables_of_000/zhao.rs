@@ -2,8 +2,8 @@
 
 use lamp_grayscale::material::Material;
 use lamp_planning::column::{
-    ColumnObjective, ColumnOptions, GlassLight, HeightCurve, Measures, MirrorSpread, MirrorTimes,
-    Setup, Stop, Tracing, nearest_times,
+    Allowed, ColumnObjective, ColumnOptions, GlassLight, HeightCurve, Measures, MirrorSpread,
+    MirrorTimes, Setup, Stop, Tracing, nearest_times,
 };
 use lamp_planning::target::{Grid, HeightMap, Target};
 use lamp_stack::{Catalogued, Length};
@@ -19,6 +19,7 @@ pub(crate) const LIT: f64 = 12.65 / 13.65;
 const RAY_MW: f64 = 8.0275e-11;
 /// No optimum of these tests gets near this: 000 has no bound.
 pub(crate) const LONGEST_S: f64 = 600.0;
+pub(crate) const ALLOWED: Allowed = Allowed { max_s: LONGEST_S, evenness: 0.0 };
 pub(crate) const CERTAIN: Stop = Stop { gap: 1e-6, steps: 10_000 };
 
 /// 000's projector, with this number of mirrors and column voxels along both axes.
@@ -58,6 +59,7 @@ pub(crate) fn options(objective: ColumnObjective, bitmaps: usize) -> ColumnOptio
         bitmaps,
         fewer: false,
         gray: None,
+        dose_error: 0.0,
         max_s: LONGEST_S,
         robust: Length::default(),
         step_s: 1e-3,
@@ -95,7 +97,7 @@ impl Part {
 
     /// Finds the times for which 000 optimizes E.
     pub(crate) fn times(&self, light: &GlassLight) -> MirrorTimes {
-        let times = nearest_times(light, &self.doses, LONGEST_S, &[0.0], CERTAIN, &|| false);
+        let times = nearest_times(light, &self.doses, ALLOWED, &[0.0], CERTAIN, &|| false);
         assert!(times.relative_gap() <= CERTAIN.gap, "{:e}", times.relative_gap());
         assert!(times.seconds.iter().all(|&time| time < LONGEST_S));
         times

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_pipeline::glass::{BitmapCount, ColumnCureSettings, LongestTime, SearchGap};
+use lamp_pipeline::glass::{BitmapCount, ColumnCureSettings, DoseError, LongestTime, SearchGap};
 use lamp_planning::column::{ColumnObjective, Tracing};
 use lamp_stack::Length;
 
@@ -56,9 +56,14 @@ pub(super) struct ColumnCureArgs {
     ]))]
     optimize: ColumnObjective,
 
-    /// Longest time of a mirror [default: four times the flood exposure time of the highest column]
+    /// Longest time of a mirror [default: three times the flood exposure time of the highest column]
     #[arg(long, value_name = "TIME")]
     max_time: Option<LongestTime>,
+
+    /// Share by which doses may be off where that makes times shorter and more even; 0% asks for the
+    /// nearest doses alone [default: what the material's plus-minus allows, or 3%]
+    #[arg(long, value_name = "SHARE")]
+    dose_error: Option<DoseError>,
 
     /// Make the plan best on average for glass that is off by this much along each axis
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
@@ -111,6 +116,7 @@ impl ColumnCureArgs {
             gray: self.gray,
             optimize: self.optimize,
             max_time: self.max_time,
+            dose_error: self.dose_error,
             robust: self.robust,
             rays: self.rays.unwrap_or_default(),
             flat_field: self.flat_field.clone(),
