@@ -22,7 +22,7 @@ pub enum MaterialError {
     /// The light of full white is not above zero.
     #[error("intensity.value must be above zero")]
     Dark,
-    /// The exponent of the light over the gray level is none of a display.
+    /// No display has this exponent of the light over the gray level.
     #[error("gamma.value must be above zero and at most 20")]
     Gamma,
     /// Cure widths of one direction only.

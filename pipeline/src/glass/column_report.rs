@@ -66,7 +66,7 @@ struct BestReport {
     error: f64,
     /// The most by which the sum of its error and `term` is above the least possible one.
     gap: f64,
-    /// What short and even times add to the sum that is minimized.
+    /// Term of short and even times in the sum that is minimized.
     term: f64,
     /// The gap as a share of the sum.
     relative_gap: f64,

@@ -15,7 +15,7 @@ pub struct Stop {
     pub steps: usize,
 }
 
-/// The times that a search allows, and those that it prefers.
+/// The times that a search allows, and how much it prefers short and even ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allowed {
     /// The longest time of a mirror, in seconds.

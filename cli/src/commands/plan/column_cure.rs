@@ -61,7 +61,7 @@ pub(super) struct ColumnCureArgs {
     max_time: Option<LongestTime>,
 
     /// Share by which doses may be off where that makes times shorter and more even; 0% asks for the
-    /// nearest doses alone [default: what the material's plus-minus allows, or 3%]
+    /// nearest doses alone [default: by the material's plus-minus, or 3%]
     #[arg(long, value_name = "SHARE")]
     dose_error: Option<DoseError>,
 
