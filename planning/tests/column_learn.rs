@@ -6,8 +6,10 @@ use lamp_planning::MirrorSeconds;
 use lamp_planning::column::{
     ColumnObjective, ColumnOptions, GlassLight, HeightCurve, Setup, Stop, Tracing, plan,
 };
-use lamp_planning::learn::{ColumnFit, ColumnLight, Columns, HeightRow, PrintMeasurements};
-use lamp_planning::print_sim::{PrintedColumns, Truth};
+use lamp_planning::learn::{
+    ColumnLight, Columns, Factor, GlassFit, GlassModel, HeightRow, PrintMeasurements,
+};
+use lamp_planning::print_sim::{GlassPrint, Truth};
 use lamp_planning::projector::Projector;
 use lamp_planning::target::{HeightMap, Target};
 use lamp_stack::{Catalogued, Length};
@@ -48,7 +50,7 @@ fn planned(of: &Columns) -> ColumnLight {
 }
 
 fn truth(of: &Columns, text: &str) -> Columns {
-    of.changed(&Truth::parse(text).unwrap().on_glass(of, 0).unwrap())
+    of.changed(&Truth::parse(text).unwrap().on_columns(of, 0).unwrap())
 }
 
 fn measured(
@@ -58,7 +60,7 @@ fn measured(
     [um, seed]: [f64; 2],
 ) -> Vec<HeightRow> {
     let sd = Length::from_um(um);
-    let print = PrintedColumns::new(plant, light, print, None, sd, seed as u64).unwrap();
+    let print = GlassPrint::new(plant, light, print, None, sd, seed as u64).unwrap();
     match print.measured {
         PrintMeasurements::Heights(rows) => rows,
         PrintMeasurements::Areas(_) => panic!("these are heights"),
@@ -87,7 +89,7 @@ fn one_map_makes_the_next_print_as_good_as_one_that_knows_the_truth() {
         prints.push((light, rows));
         let all: Vec<_> = prints.iter().map(|(light, rows)| (light, &rows[..])).collect();
         let fit = of.fit(&all).unwrap();
-        for (factor, known) in fit.state.factors().iter().zip(TRUE) {
+        for ((_, factor), known) in fit.state.factors().zip(TRUE) {
             let off = (factor.value / known).ln() / factor.sd;
             assert!(off.abs() < 3.5 && factor.sd < 0.01, "{number}: {factor:?} for {known}");
         }
@@ -132,7 +134,7 @@ fn a_thousand_points_are_enough() {
         let mut prints: Vec<(ColumnLight, Vec<HeightRow>)> = Vec::new();
         for number in 0..2 {
             let sd = Length::from_um(2.0);
-            let print = PrintedColumns::new(&plant, &light, number, Some(1000), sd, 7).unwrap();
+            let print = GlassPrint::new(&plant, &light, number, Some(1000), sd, 7).unwrap();
             let PrintMeasurements::Heights(rows) = print.measured else { panic!("heights") };
             assert_eq!(rows.len(), 1000);
             prints.push((light, rows));
@@ -153,10 +155,10 @@ fn no_state_around_the_fit_has_less_squares() {
     let rows = measured(&plant, &light, 0, [1.0, 3.0]);
     // The deviations are doubled, so that the noise is not raised to the residuals'.
     let rows: Vec<_> = rows.into_iter().map(|row| HeightRow { sd_um: 2.0, ..row }).collect();
-    let ColumnFit { state, misfit } = of.fit(&[(&light, &rows)]).unwrap();
+    let GlassFit { state, misfit } = of.fit(&[(&light, &rows)]).unwrap();
     assert_eq!(misfit, 1.0);
-    let found = state.factors();
-    let logs = found.map(|factor| factor.value.ln());
+    let found: Vec<Factor> = state.factors().map(|(_, factor)| factor).collect();
+    let logs = std::array::from_fn(|k| found[k].value.ln());
     let least = squares(&of, &light, &rows, logs);
     let mut nearest = f64::INFINITY;
     for number in 0..125 {
@@ -180,7 +182,7 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     for seed in 1..=trials {
         let rows = measured(&plant, &light, 0, [1.0, f64::from(seed)]);
         let fit = of.fit(&[(&light, &rows)]).unwrap();
-        for ((held, factor), known) in held.iter_mut().zip(fit.state.factors()).zip(TRUE) {
+        for ((held, (_, factor)), known) in held.iter_mut().zip(fit.state.factors()).zip(TRUE) {
             let [low, high] = factor.interval();
             *held += i32::from((low..=high).contains(&known));
         }
@@ -195,7 +197,7 @@ fn a_truth_changes_projector_and_resin() {
     let of = columns("lens", "sl-5510");
     let text = "penetration-depth = '22 um'\ncritical-dose = '+25%'\nspread = '18 um'\n\
                 light = '-50%'\ndrift = '+10%'\n";
-    let change = Truth::parse(text).unwrap().on_glass(&of, 2).unwrap();
+    let change = Truth::parse(text).unwrap().on_columns(&of, 2).unwrap();
     // SL-5510 has 4 mJ/cm2 and one depth or two; zhao's cone is 12 um.
     assert_eq!((change.critical_dose, change.spread), (1.25, 1.5));
     assert!((change.light - 0.5 * 1.21).abs() < 1e-12, "{change:?}");
@@ -207,6 +209,6 @@ fn a_truth_changes_projector_and_resin() {
     // Depths grow by one factor at equal doses in units of the critical dose.
     let deep = |curve: &HeightCurve| curve.height_um(50.0 * curve.critical_dose());
     assert!((deep(&curves[1]) / deep(&curves[0]) - change.depth).abs() < 1e-9);
-    let none = Truth::parse("critical-dose = '0 mJ/cm2'").unwrap().on_glass(&of, 0);
+    let none = Truth::parse("critical-dose = '0 mJ/cm2'").unwrap().on_columns(&of, 0);
     assert!(none.is_err());
 }

@@ -31,7 +31,7 @@ pub(crate) fn plan_ecpl<'py>(keywords: &Bound<'py, PyDict>) -> PyResult<Bound<'p
     let py = keywords.py();
     let settings: EcplSettings = settings(py, &given(keywords)?, |_, _| Ok(()))?;
     check_given(py, &settings.projector, &settings.material)?;
-    planned(py, move |watcher| Ok(settings.plan(watcher)?.glass_plan()))
+    planned(py, move |watcher| settings.plan(watcher)?.glass_plan())
 }
 
 fn check_given(py: Python<'_>, projector: &Path, material: &Path) -> PyResult<()> {

@@ -40,6 +40,7 @@ mod late_disks;
 mod launchers;
 mod learn;
 mod learn_columns;
+mod learn_ecpl;
 mod licences;
 mod machine;
 mod material;

@@ -8,20 +8,21 @@ use std::str::FromStr;
 
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
-use lamp_planning::ShownBitmap;
 use lamp_planning::column::{
     ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Setup, Stop, Tracing, plan,
 };
+use lamp_planning::learn::{ColumnLight, Columns, GlassModel, GlassState};
 use lamp_planning::projector::Projector;
 use lamp_planning::target::{GrayPicture, Grid, HeightMap};
+use lamp_planning::{MirrorSeconds, ShownBitmap};
 use lamp_stack::{Length, quoted};
 use serde::{Deserialize, Serialize};
 
-use super::GlassPlan;
 use super::column_measures::unmeasured_heights;
 use super::column_report::report_of;
-use super::json_of;
+use super::job::{GlassJob, GlassKind, GlassSettings, PlanInputs};
 use super::target::{GivenTarget, TargetSettings, of_work};
+use super::{GlassPlan, json_of};
 use crate::documents::document_and_word;
 use crate::error::Error;
 use crate::heights::parse_share;
@@ -197,39 +198,59 @@ pub struct ColumnCure {
     /// The bitmaps, their times and doses.
     pub plan: ColumnPlan,
     /// Files from which the plan can be made again.
-    pub inputs: PlanInputs,
+    pub inputs: PlanInputs<ColumnCureSettings>,
 }
 
-/// The files of a plan's folder from which the plan can be made again.
-#[derive(Clone, Debug)]
-pub struct PlanInputs {
-    /// The settings, with the names of the other files.
-    pub settings: ColumnCureSettings,
-    /// The target's heights, as a PNG.
-    pub target: Vec<u8>,
-    /// The light of each mirror, as a PNG.
-    pub flat_field: Option<Vec<u8>>,
-}
+/// The name of the target in a plan's folder.
+const TARGET: &str = "target.png";
+/// The name of the flat field.
+const FLAT_FIELD: &str = "flat-field.png";
 
-impl PlanInputs {
-    /// The name of the settings.
-    pub const SETTINGS: &'static str = "plan.toml";
-    /// The name of the target.
-    pub const TARGET: &'static str = "target.png";
-    /// The name of the flat field.
-    pub const FLAT_FIELD: &'static str = "flat-field.png";
+impl GlassSettings for ColumnCureSettings {
+    type Model = Columns;
 
-    /// Returns the files, by their names.
-    ///
-    /// # Errors
-    /// Returns an error if a path of the settings is not text.
-    pub fn files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
-        let settings = toml::to_string(&self.settings).map_err(of_work)?;
-        let flat_field = self.flat_field.clone().map(|bytes| (Self::FLAT_FIELD, bytes));
-        Ok([(Self::SETTINGS, settings.into_bytes()), (Self::TARGET, self.target.clone())]
-            .into_iter()
-            .chain(flat_field)
-            .collect())
+    const KIND: GlassKind = GlassKind::ColumnCure;
+
+    fn kept_files(&mut self) -> Vec<&mut PathBuf> {
+        std::iter::once(&mut self.target.target).chain(&mut self.flat_field).collect()
+    }
+
+    fn model(&self, projector: &Projector, material: &Material) -> Result<Columns, Error> {
+        HeightCurve::of(material).map_err(of_work)?;
+        let target = self.target.open_again(projector)?;
+        let wanted = self.wanted(projector, &target)?;
+        let (projector, material) = (projector.clone(), material.clone());
+        Ok(Columns { projector, material, wanted, tracing: self.rays })
+    }
+
+    fn light(
+        &self,
+        model: &Columns,
+        projector: &Projector,
+        bitmaps: &[ShownBitmap],
+    ) -> Result<ColumnLight, Error> {
+        let shown = MirrorSeconds::of(bitmaps, |level| projector.share(level));
+        let of_display = Setup::of(projector, &model.wanted.grid, self.rays);
+        let setup = Setup { mirrors: shown.mirrors, ..of_display };
+        Ok(ColumnLight { shown, flat_field: self.flat_field(&setup)? })
+    }
+
+    fn next(
+        &self,
+        job: &GlassJob<Self>,
+        state: &GlassState,
+        command: &str,
+        watcher: &dyn Watcher,
+    ) -> Result<Vec<GlassPlan>, Error> {
+        let Columns { projector, material, .. } = job.model.in_state(state);
+        let words = (projector.name.clone(), material.name.clone());
+        let mut next = self.plan_for((projector, words.0), (material, words.1), watcher)?;
+        next.target = job.part().to_owned();
+        command.clone_into(&mut next.command);
+        // The next plan's folder is one that a job can begin with.
+        next.inputs.settings.projector.clone_from(&job.given.projector);
+        next.inputs.settings.material.clone_from(&job.given.material);
+        Ok(vec![next.glass_plan()?])
     }
 }
 
@@ -257,7 +278,10 @@ impl ColumnCureSettings {
     ) -> Result<ColumnCure, Error> {
         let curve = HeightCurve::of(&material).map_err(of_work)?;
         let target = self.target.open(&projector, watcher)?;
-        let (wanted, light) = self.light(&projector, &target)?;
+        let wanted = self.wanted(&projector, &target)?;
+        let mut setup = Setup::of(&projector, &wanted.grid, self.rays);
+        setup.flat_field = self.flat_field(&setup)?;
+        let light = GlassLight::new(setup);
         if let Some(text) = unmeasured_heights(&wanted, &curve, &material) {
             watcher.remark(Remark::warning(text));
         }
@@ -280,12 +304,8 @@ impl ColumnCureSettings {
         Ok(cure)
     }
 
-    /// Returns the target's columns, with room for light around it, and the light on them.
-    fn light(
-        &self,
-        projector: &Projector,
-        target: &GivenTarget,
-    ) -> Result<(HeightMap, GlassLight), Error> {
+    /// Returns the target's columns, with room for light around it.
+    fn wanted(&self, projector: &Projector, target: &GivenTarget) -> Result<HeightMap, Error> {
         let voxel = self.voxel.or(projector.voxel.as_ref().map(|voxel| voxel.value));
         let Some(voxel) = voxel else {
             let name = self.projector.display();
@@ -296,13 +316,13 @@ impl ColumnCureSettings {
         };
         let grid = Setup::grid_around(projector, target.size(), voxel)
             .map_err(|error| of_work(error).at(self.target.given()))?;
-        let wanted = target.heights(&grid, projector)?;
-        let mut setup = Setup::of(projector, &grid, self.rays);
-        if let Some(path) = &self.flat_field {
-            let flat = flat_field(path, &setup);
-            setup.flat_field = flat.map_err(|error| error.at(path.display().to_string()))?;
-        }
-        Ok((wanted, GlassLight::new(setup)))
+        target.heights(&grid, projector)
+    }
+
+    /// Returns the light of the mirrors that a setup uses. Empty: all are alike.
+    fn flat_field(&self, setup: &Setup) -> Result<Vec<f64>, Error> {
+        let Some(path) = &self.flat_field else { return Ok(Vec::new()) };
+        flat_field(path, setup).map_err(|error| error.at(path.display().to_string()))
     }
 
     /// Returns the files from which the plan can be made again.
@@ -311,24 +331,26 @@ impl ColumnCureSettings {
         target: &GivenTarget,
         projector: &Projector,
         wanted: &HeightMap,
-    ) -> Result<PlanInputs, Error> {
+    ) -> Result<PlanInputs<Self>, Error> {
         let voxel = Length::from_um(wanted.grid.pitch_um);
         // The room for light around the target depends on the projector.
         let heights = target.heights(&Grid::over(target.size(), voxel), projector)?;
         let (png, scale) = heights.to_png().map_err(of_work)?;
         let settings = Self {
             target: TargetSettings {
-                target: PlanInputs::TARGET.into(),
+                target: TARGET.into(),
                 pixel: Some(scale.pixel),
                 full: Some(scale.full),
                 ..TargetSettings::default()
             },
             voxel: Some(voxel),
-            flat_field: self.flat_field.as_ref().map(|_| PlanInputs::FLAT_FIELD.into()),
+            flat_field: self.flat_field.as_ref().map(|_| FLAT_FIELD.into()),
             ..self.clone()
         };
         let flat_field = self.flat_field.as_ref().map(fs::read).transpose()?;
-        Ok(PlanInputs { settings, target: png, flat_field })
+        let flat_field = flat_field.map(|bytes| (FLAT_FIELD.to_owned(), bytes));
+        let files = std::iter::once((TARGET.to_owned(), png)).chain(flat_field).collect();
+        Ok(PlanInputs { settings, files })
     }
 
     fn options(
@@ -479,7 +501,7 @@ impl ColumnCure {
 }
 
 /// Reads the light of the mirrors that a setup uses.
-pub(super) fn flat_field(path: &Path, setup: &Setup) -> Result<Vec<f64>, Error> {
+fn flat_field(path: &Path, setup: &Setup) -> Result<Vec<f64>, Error> {
     let file = File::open(path)?;
     let picture = GrayPicture::read(BufReader::new(file)).map_err(of_work)?;
     let [columns, rows] = setup.display;

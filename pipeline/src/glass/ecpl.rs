@@ -3,20 +3,31 @@
 use std::path::PathBuf;
 
 use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::Intensity;
 use lamp_planning::ShownBitmap;
-use lamp_planning::ecpl::{KineticSetting, Method, Profile, RingExposure, RingPlan, plan};
+use lamp_planning::ecpl::{
+    KineticSetting, Method, Profile, RingExposure, RingPlan, RingPlanError, RingSimulation,
+    WantedProfile, plan,
+};
+use lamp_planning::learn::{GlassModel, GlassState, Rings};
 use lamp_planning::projector::Projector;
 use lamp_planning::target::{Grid, Round};
-use lamp_stack::quoted;
+use lamp_stack::{Image, quoted};
 use serde::{Deserialize, Serialize};
 
+use super::job::{GlassJob, GlassKind, GlassSettings, PlanInputs};
 use super::kinetics_report::{CuredRings, RingsReport};
-use super::target::{TargetSettings, of_work};
+use super::target::{GivenTarget, TargetSettings, of_work};
 use super::{GlassPlan, json_of};
 use crate::documents::document;
 use crate::error::Error;
 use crate::watcher::Watcher;
 use crate::words::{path, text};
+
+/// The shares of a state's light that the next print is planned for. The search among whole steps of
+/// the display ends in one of many minima, whose errors differ by more than the state's: the best of
+/// a few plans is better than one.
+const LIGHTS: [f64; 5] = [1.0, 0.985, 1.015, 0.97, 1.03];
 
 /// A round target, a projector and a resin, and how to plan the bitmaps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -47,10 +58,14 @@ pub struct RingCure {
     pub projector: Projector,
     /// The material's name.
     pub material: String,
+    /// The command, as the bitmaps record it.
+    pub command: String,
     /// How bitmaps and times were found.
     pub method: Method,
     /// The bitmaps, and the profile that they cure.
     pub plan: RingPlan,
+    /// Files from which the plan can be made again, if the target's can be kept.
+    pub inputs: Option<PlanInputs<EcplSettings>>,
 }
 
 /// Plan of rings by kinetics, by `lamp plan ecpl`.
@@ -81,6 +96,18 @@ impl EcplSettings {
         let material: Material = document(&self.material)?;
         let setting = kinetic_setting(&projector, &material)?;
         let target = self.target.open(&projector, watcher)?;
+        self.plan_for(setting, projector, material.name, &target, watcher)
+    }
+
+    /// Plans the bitmaps for the light and the kinetics of a setting.
+    fn plan_for(
+        &self,
+        setting: KineticSetting,
+        projector: Projector,
+        material: String,
+        target: &GivenTarget,
+        watcher: &dyn Watcher,
+    ) -> Result<RingCure, Error> {
         let round = target.profile()?;
         let height_um = |radius_um| round.height_um(radius_um);
         let is_stopped = || watcher.is_stopped();
@@ -88,16 +115,126 @@ impl EcplSettings {
             .map_err(|error| of_work(error).at(self.target.given()))?;
         Ok(RingCure {
             target: target.name().to_owned(),
+            command: self.command(target.name(), &projector.name, &material),
+            inputs: self.inputs()?,
             round,
             projector,
-            material: material.name,
+            material,
             method: self.method,
             plan,
         })
     }
+
+    /// The command, as the bitmaps record it.
+    fn command(&self, target: &str, projector: &str, material: &str) -> String {
+        format!(
+            "lamp plan ecpl {} --projector {} --material {} --method {}",
+            quoted(target),
+            quoted(projector),
+            quoted(material),
+            self.method
+        )
+    }
+
+    /// Returns the files from which the plan can be made again, if the target's can be kept.
+    fn inputs(&self) -> Result<Option<PlanInputs<Self>>, Error> {
+        let Some((name, bytes)) = self.target.kept()? else { return Ok(None) };
+        let mut settings = self.clone();
+        settings.target.target = name.clone().into();
+        Ok(Some(PlanInputs { settings, files: vec![(name, bytes)] }))
+    }
+}
+
+impl GlassSettings for EcplSettings {
+    type Model = Rings;
+
+    const KIND: GlassKind = GlassKind::Ecpl;
+
+    fn kept_files(&mut self) -> Vec<&mut PathBuf> {
+        vec![&mut self.target.target]
+    }
+
+    fn model(&self, projector: &Projector, material: &Material) -> Result<Rings, Error> {
+        let setting = kinetic_setting(projector, material)?;
+        let round = self.target.open_again(projector)?.profile()?;
+        Ok(Rings::new(setting, projector, material, round))
+    }
+
+    fn light(
+        &self,
+        model: &Rings,
+        _: &Projector,
+        bitmaps: &[ShownBitmap],
+    ) -> Result<Vec<RingExposure>, Error> {
+        let exposures = rings_shown(bitmaps)?;
+        // Before a model computes them: the display may not be able to show them.
+        model.check(&exposures).map_err(of_work)?;
+        Ok(exposures)
+    }
+
+    fn next(
+        &self,
+        job: &GlassJob<Self>,
+        state: &GlassState,
+        command: &str,
+        watcher: &dyn Watcher,
+    ) -> Result<Vec<GlassPlan>, Error> {
+        let setting = job.model.in_state(state).setting;
+        let target = self.target.open_again(&job.projector)?;
+        let mut plans = Vec::new();
+        for times in LIGHTS {
+            let light = Intensity::from_mw_per_cm2(times * setting.light.mw_per_cm2());
+            let (projector, material) = (job.projector.clone(), job.material.name.clone());
+            let other = KineticSetting { light, ..setting };
+            let planned = self.plan_for(other, projector, material, &target, watcher);
+            let mut next = match planned {
+                Ok(next) => next,
+                // The first plan is for the state itself.
+                Err(error) if plans.is_empty() || watcher.is_stopped() => return Err(error),
+                Err(_) => continue,
+            };
+            job.part().clone_into(&mut next.target);
+            command.clone_into(&mut next.command);
+            // The next plan's folder is one that a job can begin with.
+            if let Some(inputs) = &mut next.inputs {
+                inputs.settings.projector.clone_from(&job.given.projector);
+                inputs.settings.material.clone_from(&job.given.material);
+            }
+            next.cure_in(setting, job.model.round.radius_um()).map_err(of_work)?;
+            plans.push(next.glass_plan()?);
+        }
+        Ok(plans)
+    }
+}
+
+/// Returns the rings that bitmaps show.
+///
+/// # Errors
+/// Returns an error if a bitmap has gray levels, or is not round about the middle of its image.
+pub fn rings_shown(bitmaps: &[ShownBitmap]) -> Result<Vec<RingExposure>, Error> {
+    let rings = |(of, bitmap): (usize, &ShownBitmap)| {
+        let Image::Mask(mask) = &bitmap.image else {
+            return Err(Error::work(format!(
+                "bitmap {of} has gray levels: kinetics take black and white ones"
+            )));
+        };
+        RingExposure::shown(mask, bitmap.time)
+            .map_err(|error| of_work(error).at(format!("bitmap {of}")))
+    };
+    (1..).zip(bitmaps).map(rings).collect()
 }
 
 impl RingCure {
+    /// Computes what the bitmaps cure in another setting.
+    fn cure_in(&mut self, setting: KineticSetting, radius_um: f64) -> Result<(), RingPlanError> {
+        let RingPlan { simulation, wanted, exposures, cured } = &mut self.plan;
+        *simulation = RingSimulation::of_plan(setting, exposures, radius_um)?;
+        let cells = simulation.reaction().cells();
+        *wanted = WantedProfile::new(cells, |radius_um| self.round.height_um(radius_um));
+        *cured = simulation.cure(exposures);
+        Ok(())
+    }
+
     /// Returns the cured part, for its report.
     pub fn cured(&self) -> CuredRings<'_> {
         let RingPlan { simulation, wanted, exposures, cured } = &self.plan;
@@ -105,8 +242,11 @@ impl RingCure {
     }
 
     /// Returns the bitmaps with their report, and what they cure.
-    pub fn glass_plan(&self) -> GlassPlan {
-        let Self { target, round, projector, material, method, plan } = self;
+    ///
+    /// # Errors
+    /// Returns an error if a path of the settings is not text.
+    pub fn glass_plan(&self) -> Result<GlassPlan, Error> {
+        let Self { target, command, round, projector, material, method, plan, inputs } = self;
         let report = EcplReport {
             schema: "lamp-plan-ecpl-1",
             target,
@@ -121,21 +261,16 @@ impl RingCure {
             image: exposure.drawn(display.columns, display.rows).into(),
             time: exposure.time,
         };
-        GlassPlan {
+        Ok(GlassPlan {
             part: target.clone(),
-            command: format!(
-                "lamp plan ecpl {} --projector {} --material {} --method {method}",
-                quoted(target),
-                quoted(&projector.name),
-                quoted(material),
-            ),
+            command: command.clone(),
             pitch: projector.pitch.value,
             bitmaps: plan.exposures.iter().map(bitmap).collect(),
             report: json_of(&report),
             wanted: Some(grid.round(|radius_um| round.height_um(radius_um))),
             cured: plan.cured.on(&grid),
-            inputs: Vec::new(),
-        }
+            inputs: inputs.as_ref().map_or(Ok(Vec::new()), PlanInputs::files)?,
+        })
     }
 }
 

@@ -2,10 +2,10 @@
 //! by kinetics (003).
 
 mod column_cure;
-mod column_job;
 mod column_measures;
 mod column_report;
 mod ecpl;
+mod job;
 mod kinetics_report;
 mod target;
 
@@ -16,12 +16,14 @@ use serde::Serialize;
 use serde_json::Value;
 
 pub use column_cure::{
-    BitmapCount, ColumnCure, ColumnCureSettings, DoseError, LongestTime, PlanInputs, SearchGap,
+    BitmapCount, ColumnCure, ColumnCureSettings, DoseError, LongestTime, SearchGap,
 };
-pub use column_job::{ColumnJob, ColumnJobPrint, ColumnLesson, is_column_job};
 pub use column_measures::{MeasuresReport, measures_line, measures_report, unmeasured_heights};
 pub use column_report::ColumnCureReport;
-pub use ecpl::{EcplReport, EcplSettings, RingCure, kinetic_setting, map_grid};
+pub use ecpl::{EcplReport, EcplSettings, RingCure, kinetic_setting, map_grid, rings_shown};
+pub use job::{
+    GlassJob, GlassJobPrint, GlassKind, GlassLesson, GlassSettings, PlanInputs, job_kind, plan_kind,
+};
 pub use kinetics_report::{CuredRings, RingBitmap, RingOutcome, RingSetting, RingsReport};
 pub use target::{GivenTarget, TargetSettings};
 
@@ -43,7 +45,7 @@ pub struct GlassPlan {
     /// The cured heights, on the same columns.
     pub cured: HeightMap,
     /// Files from which the plan can be made again, by their names.
-    pub inputs: Vec<(&'static str, Vec<u8>)>,
+    pub inputs: Vec<(String, Vec<u8>)>,
 }
 
 impl GlassPlan {

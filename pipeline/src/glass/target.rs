@@ -1,5 +1,6 @@
 //! Targets of planners on a fixed glass: a built-in target or a file.
 
+use std::fs;
 use std::ops::Deref;
 use std::path::PathBuf;
 
@@ -8,12 +9,12 @@ use lamp_planning::target::{
     Grid, HeightMap, MapScale, Round, Shapes, Target, TargetError, TargetOptions,
 };
 use lamp_slicing::Units;
-use lamp_stack::{Catalogued, Length};
+use lamp_stack::{Builtin, Catalogued, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind};
 use crate::solid::part_notes;
-use crate::watcher::{Remark, Watcher};
+use crate::watcher::{KeptRemarks, Remark, Watcher};
 use crate::words::{optional, path, text};
 
 /// A target, and how its file is read.
@@ -56,6 +57,27 @@ impl TargetSettings {
         self.target.display().to_string()
     }
 
+    /// Returns the target's file, for a plan's folder: its name there, and its bytes. A target that is
+    /// not a file, such as standard input, cannot be kept.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot be read.
+    pub(super) fn kept(&self) -> Result<Option<(String, Vec<u8>)>, Error> {
+        let path = &self.target;
+        let is_named = |builtin: &&Builtin| path.to_str() == Some(builtin.name);
+        if let Some(builtin) = Shapes::BUILTINS.iter().find(is_named) {
+            return Ok(Some(("target.toml".to_owned(), builtin.toml.into())));
+        }
+        let at_given = |error: std::io::Error| Error::from(error).at(self.given());
+        if !fs::metadata(path).map_err(at_given)?.is_file() {
+            return Ok(None);
+        }
+        // The format of a target follows from its ending, too.
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        let name = ending.map_or("target".to_owned(), |ending| format!("target.{ending}"));
+        Ok(Some((name, fs::read(path).map_err(at_given)?)))
+    }
+
     /// Returns the built-in target of the name, or the target in the file. `watcher` takes notes
     /// about the parts of a file that are not read.
     ///
@@ -75,6 +97,14 @@ impl TargetSettings {
         }
         target.check_width(projector).map_err(at_given)?;
         Ok(GivenTarget { target, given: self.given() })
+    }
+
+    /// Returns the same as [`open`](Self::open), without the notes, which a plan had already.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub(super) fn open_again(&self, projector: &Projector) -> Result<GivenTarget, Error> {
+        self.open(projector, &KeptRemarks::default().of("a target"))
     }
 
     fn read(&self) -> Result<Target, Error> {

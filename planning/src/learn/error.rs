@@ -10,6 +10,7 @@ use thiserror::Error;
 
 use super::heights::FaceError;
 use crate::column::NoHeights;
+use crate::ecpl::RingPlanError;
 use crate::resin_light::NoLight;
 use crate::speed::{PartError, PlatformError, SpeedPlanError};
 
@@ -267,4 +268,7 @@ pub enum LearnError {
     /// The material does not state how deep a dose cures.
     #[error(transparent)]
     Curve(#[from] NoHeights),
+    /// The kinetics cannot be computed.
+    #[error(transparent)]
+    Rings(#[from] RingPlanError),
 }

@@ -4,24 +4,30 @@
 //! - [`Law`] turns the wrong voxels of each layer into changes of its time.
 //! - [`Response`] is the model's effect of a change of times on the wrong voxels.
 //! - [`convergence`] checks whether a law's changes shrink the errors of the next prints.
-//! - [`Columns`] finds the same state from the heights of columns that bitmaps cure.
+//! - A [`GlassModel`] finds such a state from the heights that bitmaps cure on a glass: of [`Columns`] by
+//!   doses, of [`Rings`] by the kinetics of resin and oxygen.
 //! - A [`Job`] keeps a stack and all its prints in a folder; [`learn`] turns the
 //!   [`PrintMeasurements`] of the last print into the times of the next.
 
 mod columns;
 mod convergence;
 mod error;
+mod glass;
+mod glass_state;
 mod heights;
 mod job;
 mod law;
 mod measured;
 mod response;
+mod rings;
 mod state;
 mod step;
 
-pub use columns::{ColumnFit, ColumnLight, Columns, GlassChange};
+pub use columns::{ColumnLight, Columns, GlassChange};
 pub use convergence::{Convergence, convergence, largest_safe_gain};
 pub use error::{JobError, JobFileError, LearnError, MeasuredError};
+pub use glass::{GlassFit, GlassModel};
+pub use glass_state::{GlassNumber, GlassState};
 pub use heights::{FaceError, face_at, height_of};
 pub use job::{
     Job, JobFile, JobPrint, digest_of_stack, measured_name, print_to_learn_from, profile_name,
@@ -30,6 +36,7 @@ pub use job::{
 pub use law::{Law, MultiLaw, SHORTEST, errors_of};
 pub use measured::{AreaRow, HeightRow, PrintError, PrintMeasurements};
 pub use response::Response;
+pub use rings::{RingChange, Rings};
 pub use state::{Factor, LightState, Unseparated};
 pub use step::{Learned, Lesson, Method, StateLesson, learn};
 

@@ -109,11 +109,6 @@ impl LightState {
         [self.penetration_depth, self.dose, self.spread]
     }
 
-    /// Returns the covariance of the three logarithms.
-    pub(super) fn covariance(&self) -> &[[f64; NUMBERS]; NUMBERS] {
-        &self.covariance
-    }
-
     pub(super) fn logs(&self) -> [f64; NUMBERS] {
         self.factors().map(|factor| factor.value.ln())
     }
@@ -125,23 +120,36 @@ impl LightState {
 
     /// Returns the numbers that the measurements cannot separate.
     pub fn unseparated(&self) -> Vec<Unseparated> {
-        let mut pairs = Vec::new();
-        for (a, b) in [(DEPTH, DOSE), (DEPTH, SPREAD), (DOSE, SPREAD)] {
-            let own = self.covariance[a][a] * self.covariance[b][b];
-            let correlation = self.covariance[a][b] / own.sqrt();
-            if correlation.abs() > 0.9 {
-                pairs.push(Unseparated { names: [Self::NAMES[a], Self::NAMES[b]], correlation });
-            }
-        }
-        pairs
+        unseparated(&Self::NAMES, &self.covariance)
     }
+}
+
+/// Returns the pairs of numbers that measurements cannot separate, by the covariance of their
+/// logarithms.
+pub(super) fn unseparated(
+    names: &[&'static str],
+    covariance: &[impl AsRef<[f64]>],
+) -> Vec<Unseparated> {
+    let at = |row: usize, column: usize| covariance[row].as_ref()[column];
+    let pairs = (0..names.len()).flat_map(|a| (a + 1..names.len()).map(move |b| (a, b)));
+    pairs
+        .map(|(a, b)| Unseparated {
+            names: [names[a], names[b]],
+            correlation: at(a, b) / (at(a, a) * at(b, b)).sqrt(),
+        })
+        .filter(|pair| pair.correlation.abs() > 0.9)
+        .collect()
 }
 
 /// Returns the standard deviation of a number's logarithm, if its file states an interval.
 pub(super) fn stated_sd<T: Quantity>(given: &Given<T>) -> Option<f64> {
+    Some(sd_of(given.plus_minus.as_ref()?.number(), given.value.number()))
+}
+
+/// Returns the standard deviation of a number's logarithm, given half of its interval.
+pub(super) fn sd_of(half: f64, value: f64) -> f64 {
     // An interval of 95 % reaches 1.96 standard deviations to each side.
-    let half = given.plus_minus.as_ref()?.number();
-    Some((half / (1.96 * given.value.number())).max(BEST_STATED))
+    (half / (1.96 * value)).max(BEST_STATED)
 }
 
 /// Returns how exactly a material states its numbers, as standard deviations of logarithms.

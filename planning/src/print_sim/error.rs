@@ -4,6 +4,7 @@ use lamp_stack::Length;
 use thiserror::Error;
 
 use crate::column::NoHeights;
+use crate::learn::LearnError;
 use crate::light::LightError;
 use crate::resin_light::NoLight;
 use crate::speed::PartError;
@@ -41,6 +42,12 @@ pub enum PrintSimError {
     // No source: the message contains its text.
     #[error("the truth is impossible: {0}")]
     Truth(LightError),
+    /// The model of the job does not have a number of the truth.
+    #[error("the truth has `{0}`, which is not a number of this job's model: leave it out")]
+    OtherModel(&'static str),
+    /// The model of a plan on a glass cannot be computed.
+    #[error(transparent)]
+    Model(#[from] LearnError),
     /// The model cannot expose the part.
     #[error(transparent)]
     Part(#[from] PartError),

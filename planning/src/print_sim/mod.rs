@@ -4,15 +4,15 @@
 //! - [`Truth`] says how they differ.
 //! - [`SimulatedPrint`] counts the wrong pixels of a print, measures heights on it, and gives its
 //!   body as cured layers.
-//! - [`PrintedColumns`] measures the heights that bitmaps cure on a glass.
+//! - [`GlassPrint`] measures the heights that bitmaps cure on a glass.
 
-mod columns;
 mod error;
 mod faces;
+mod glass;
 mod print;
 mod truth;
 
-pub use columns::PrintedColumns;
 pub use error::{PrintSimError, TruthError};
+pub use glass::GlassPrint;
 pub use print::{CuredBody, SimulatedHeights, SimulatedPrint};
 pub use truth::{Change, TrueNumber, Truth};

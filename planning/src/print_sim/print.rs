@@ -53,6 +53,7 @@ impl<'a> SimulatedPrint<'a> {
         truth: &Truth,
         memory: u64,
     ) -> Result<Self, PrintSimError> {
+        truth.check_doses()?;
         let of_material = Light::of(material, job.light.at)?;
         let light = truth.light(&of_material, number).map_err(PrintSimError::Truth)?;
         let simulation = Simulation::new(&job.part, &light, memory)?;

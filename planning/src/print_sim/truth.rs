@@ -2,12 +2,12 @@
 
 use std::str::FromStr;
 
-use lamp_grayscale::resin::{Dose, Intensity, Quantity};
+use lamp_grayscale::resin::{Concentration, Dose, Intensity, Quantity};
 use lamp_stack::{Length, TomlError, read_toml};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
-use super::error::TruthError;
+use super::error::{PrintSimError, TruthError};
 use crate::light::{IntensityOf, Light, LightError};
 
 /// How a machine and its resin differ from the numbers of a material.
@@ -36,6 +36,10 @@ pub struct Truth {
     /// The standard deviation of the spread of light, along rows and along columns. A change of the
     /// spread leaves the light of a wide field as it is.
     pub spread: TrueNumber<Length>,
+    /// The oxygen that is dissolved before exposure, for kinetics.
+    pub oxygen: TrueNumber<Concentration>,
+    /// The conversion where resin is solid, for kinetics.
+    pub critical_conversion: Change,
     /// The change of the light from each print to the next.
     pub drift: Change,
 }
@@ -132,6 +136,25 @@ impl Truth {
             None => TruthError::Syntax { line, problem },
             Some(_) => TruthError::Key { line, problem },
         })
+    }
+
+    /// Refuses the numbers that only kinetics have.
+    pub(super) fn check_doses(&self) -> Result<(), PrintSimError> {
+        if self.oxygen != TrueNumber::default() {
+            return Err(PrintSimError::OtherModel("oxygen"));
+        }
+        if self.critical_conversion != Change::default() {
+            return Err(PrintSimError::OtherModel("critical-conversion"));
+        }
+        Ok(())
+    }
+
+    /// Refuses the number that kinetics do not have.
+    pub(super) fn check_kinetics(&self) -> Result<(), PrintSimError> {
+        match self.critical_dose == TrueNumber::default() {
+            true => Ok(()),
+            false => Err(PrintSimError::OtherModel("critical-dose")),
+        }
     }
 
     /// Returns the light of a print, from 0, given the light of the material.

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 use lamp_grayscale::resin::ExposureTime;
 use lamp_pipeline::documents::document;
-use lamp_pipeline::glass::is_column_job;
+use lamp_pipeline::glass::job_kind;
 use lamp_planning::Light;
 use lamp_planning::learn::{JobFile, digest_of_stack, profile_name};
 use lamp_planning::speed::{PartPages, times_table};
@@ -115,9 +115,9 @@ fn new_folder_of(folder: &Path) -> Result<FolderBeside, Exit> {
 /// Returns the reason why a job cannot be begun a second time.
 fn refuse_second(folder: &Path, stack: &Path, digest: &str) -> Result<Exit, Exit> {
     let (folder, stack) = (folder.to_owned(), input_name(stack));
-    if is_column_job(&folder) {
+    if job_kind(&folder).is_some() {
         let folder = folder.display();
-        let error = anyhow!("{folder} is the job of a plan of column cure: name another folder");
+        let error = anyhow!("{folder} is the job of a plan of bitmaps: name another folder");
         return Ok(Exit::Failed(error));
     }
     let there = JobFile::read(&folder)?;

@@ -1,7 +1,7 @@
 //! `lamp learn`: corrects the times of layers, or bitmaps, after every print.
 
 mod begin;
-mod columns;
+mod glass;
 mod plot;
 mod report;
 
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use lamp_pipeline::glass::is_column_job;
+use lamp_pipeline::glass::job_kind;
 use lamp_pipeline::memory;
 use lamp_planning::learn::{Job, Law, Method, PrintMeasurements, learn};
 use lamp_planning::speed::{Platform, Speed};
@@ -42,8 +42,8 @@ const MAX_TABLE: u64 = 64 << 20;
 /// state of light and resin that all prints show, plans the times again for that state, and writes
 /// them for the next print.
 ///
-/// A job can also begin with the folder of lamp plan column-cure. Its measurements are the heights
-/// of columns, as a table or as a height map, and the next print is another such folder.
+/// A job can also begin with the folder of lamp plan column-cure or lamp plan ecpl. Its measurements
+/// are heights on the glass, as a table or as a height map, and the next print is another such folder.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -58,7 +58,7 @@ pub(crate) struct LearnArgs {
     job: PathBuf,
 
     /// Begin the job with this stack, whose pages state the exposures of print 0, or with the folder
-    /// of a plan of column cure
+    /// of a plan of column-cure or ecpl
     #[arg(long, value_name = "STACK|PLAN", conflicts_with = "measured")]
     start: Option<PathBuf>,
 
@@ -66,7 +66,7 @@ pub(crate) struct LearnArgs {
     kept: KeptOptions,
 
     /// Measurements of a print: x_mm, y_mm, z_mm, measured_mm and sd_um, or layer, over_px and
-    /// under_px; of a plan of column cure also a PNG height map
+    /// under_px; of a part on a glass also a PNG height map
     #[arg(long, value_name = "FILE", requires = "output")]
     measured: Option<PathBuf>,
 
@@ -116,8 +116,8 @@ struct KeptOptions {
     #[arg(long, value_name = "MATERIAL", requires = "start")]
     material: Option<PathBuf>,
 
-    /// Projector of a plan of column cure: a built-in projector's name (see lamp projector list) or
-    /// a file
+    /// Projector of a plan of column-cure or ecpl: a built-in projector's name (see lamp projector
+    /// list) or a file
     #[arg(long, value_name = "PROJECTOR", requires = "start")]
     projector: Option<PathBuf>,
 
@@ -194,11 +194,11 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
         };
         // A folder of pages is a stack, too.
         if stack.join(PlanFolder::BITMAPS).exists() {
-            return columns::begin(args, stack, material, &progress);
+            return glass::begin(args, stack, material, &progress);
         }
         if args.kept.projector.is_some() {
             return Err(Exit::usage(format!(
-                "--projector is for the folder of a plan of column cure: {} is another input",
+                "--projector is for the folder of a plan of bitmaps on a glass: {} is another input",
                 input_name(stack)
             )));
         }
@@ -209,11 +209,13 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
             "begin a job with --start STACK --material M, or give what was --measured",
         ));
     };
-    if is_column_job(&args.job) {
-        return columns::run(args, measured, output, &progress);
+    if let Some(kind) = job_kind(&args.job) {
+        return glass::run(kind, args, measured, output, &progress);
     }
     if args.pixel.is_some() {
-        return Err(Exit::usage("--pixel and --full are for jobs of column cure: leave them out"));
+        return Err(Exit::usage(
+            "--pixel and --full are for jobs of bitmaps on a glass: leave them out",
+        ));
     }
     parse_table(&output.to_string_lossy()).map_err(Exit::usage)?;
     if is_stream(output) {

@@ -1,7 +1,9 @@
 //! Plots the errors and the times of a job's prints (004 figures 3.7 and 3.8).
 
+use lamp_pipeline::glass::{GlassJob, GlassSettings};
 use lamp_planning::learn::{
-    AreaRow, Factor, Job, JobPrint, LightState, PrintError, PrintMeasurements,
+    AreaRow, Factor, GlassModel, GlassState, Job, JobPrint, LightState, PrintError,
+    PrintMeasurements,
 };
 use lamp_planning::speed::TimedLayer;
 
@@ -21,8 +23,10 @@ pub(super) fn plots_of(job: &Job) -> Vec<Plot> {
         .filter(|(number, _)| *number == 0 || number + MOST > job.prints.len())
         .collect();
     let mut plots = Vec::new();
-    plots.extend(course(job));
-    plots.extend(states(job));
+    let errors: Vec<_> = job.prints.iter().map(error_of).collect();
+    plots.extend(course(&errors));
+    let states = job.prints.iter().map(|print| Some(print.state.as_ref()?.factors().to_vec()));
+    plots.extend(state_plot(&LightState::NAMES, &states.collect::<Vec<_>>()));
     for (title, count) in AREAS {
         let areas = drawn.iter().filter_map(|&(n, print)| areas(job, n, print, count));
         let areas: Vec<_> = areas.collect();
@@ -46,6 +50,19 @@ pub(super) fn plots_of(job: &Job) -> Vec<Plot> {
     plots
 }
 
+/// The plots of a job of a plan on a glass, one below the other.
+pub(super) fn plots_of_glass<S: GlassSettings>(job: &GlassJob<S>) -> Vec<Plot> {
+    let prints = || job.prints.iter();
+    let errors =
+        prints().map(|print| print.measured.as_ref().map(|(measured, _)| measured.error()));
+    let factors = |state: &GlassState| state.factors().map(|(_, factor)| factor).collect();
+    let states: Vec<_> = prints().map(|print| print.state.as_ref().map(factors)).collect();
+    let prior = job.model.prior();
+    let names: Vec<_> = prior.factors().map(|(number, _)| number.name()).collect();
+    let course = course(&errors.collect::<Vec<_>>());
+    course.into_iter().chain(state_plot(&names, &states)).collect()
+}
+
 /// A count of a layer.
 type Count = fn(&AreaRow) -> f64;
 
@@ -56,17 +73,18 @@ const AREAS: [(&str, Count); 2] = [
 ];
 
 /// The errors from print to print.
-fn course(job: &Job) -> Vec<Plot> {
+fn course(errors: &[Option<PrintError>]) -> Vec<Plot> {
     let of = |title: &str, label: &str, is_of: fn(PrintError) -> bool| {
-        let errors = job.prints.iter().map(error_of).enumerate();
         let points: Vec<_> = errors
+            .iter()
+            .enumerate()
             .filter_map(|(number, error)| Some((number, error.filter(|error| is_of(*error))?)))
             .map(|(number, error)| (number as f64, error.number()))
             .collect();
         // An axis needs a length, also where no print has an error.
         let most = points.iter().map(|point| point.1).fold(1e-9, f64::max);
         let series = vec![Series { points: points.clone(), ..curve("errors", points.clone()) }];
-        let x = linear("print", -0.5..job.prints.len() as f64 - 0.5);
+        let x = linear("print", -0.5..errors.len() as f64 - 0.5);
         let y = linear(label, 0.0..1.3 * most);
         (!points.is_empty()).then(|| Plot { title: title.to_owned(), x, y, series })
     };
@@ -77,13 +95,12 @@ fn course(job: &Job) -> Vec<Plot> {
     areas.into_iter().chain(heights).collect()
 }
 
-/// The states that prints were planned for.
-fn states(job: &Job) -> Option<Plot> {
-    let states: Vec<_> = job
-        .prints
+/// The states that prints were planned for, if prints had shown one.
+fn state_plot(names: &[&str], of_prints: &[Option<Vec<Factor>>]) -> Option<Plot> {
+    let states: Vec<(f64, &Vec<Factor>)> = of_prints
         .iter()
         .enumerate()
-        .filter_map(|(number, print)| Some((number as f64, print.state.as_ref()?.factors())))
+        .filter_map(|(number, factors)| Some((number as f64, factors.as_ref()?)))
         .collect();
     let of_number = |(at, name): (usize, &&str)| {
         let points: Vec<_> =
@@ -94,12 +111,13 @@ fn states(job: &Job) -> Option<Plot> {
         });
         Series { points: points.clone(), band: band.collect(), ..curve(name, points) }
     };
-    let series: Vec<_> = LightState::NAMES.iter().enumerate().map(of_number).collect();
-    let ends = || states.iter().flat_map(|(_, factors)| factors.map(Factor::interval));
+    let series: Vec<_> = names.iter().enumerate().map(of_number).collect();
+    let factors = || states.iter().flat_map(|(_, factors)| factors.iter());
+    let ends = || factors().map(|factor| factor.interval());
     let low = ends().fold(1.0, |least: f64, ends| least.min(ends[0]));
     let high = ends().fold(1.0, |most: f64, ends| most.max(ends[1]));
     let title = "Light and resin that each print was planned for, with 95 % intervals".to_owned();
-    let x = linear("print", -0.5..job.prints.len() as f64 - 0.5);
+    let x = linear("print", -0.5..of_prints.len() as f64 - 0.5);
     let y = linear("times the material's", 0.9 * low..1.1 * high);
     (!states.is_empty()).then_some(Plot { title, x, y, series })
 }

@@ -245,8 +245,12 @@ pub(super) fn write_report(
         safe_gain,
         exposure_s: learned.times.iter().sum(),
     };
-    let states = state.map(|lesson| StateLine::all(&lesson.after, &lesson.before));
-    let unseparated = state.map(|lesson| UnseparatedLine::all(&lesson.after));
+    let states = state.map(|lesson| {
+        let factors = lesson.after.factors().into_iter().zip(lesson.before.factors());
+        let named = LightState::NAMES.into_iter().zip(factors);
+        named.map(|(number, (after, before))| StateLine::new(number, after, before))
+    });
+    let unseparated = state.map(|lesson| UnseparatedLine::all(lesson.after.unseparated()));
     let decay = decay.iter().map(|(share, decay)| ConvergenceLine {
         depth: *share,
         radius: decay.radius,
@@ -273,24 +277,23 @@ pub(super) fn write_report(
 }
 
 impl StateLine {
-    /// Returns the numbers of a state, and of the state before.
-    pub(super) fn all(after: &LightState, before: &LightState) -> impl Iterator<Item = Self> {
-        let factors = after.factors().into_iter().zip(before.factors());
-        LightState::NAMES.into_iter().zip(factors).map(|(number, (after, before))| Self {
+    /// Returns a number of a state, and of the state before.
+    pub(super) fn new(number: &'static str, after: Factor, before: Factor) -> Self {
+        Self {
             number,
             value: after.value,
             interval: after.interval(),
             before: before.value,
             interval_before: before.interval(),
-        })
+        }
     }
 }
 
 impl UnseparatedLine {
     /// Returns the pairs of a state.
-    pub(super) fn all(state: &LightState) -> impl Iterator<Item = Self> {
+    pub(super) fn all(pairs: Vec<Unseparated>) -> impl Iterator<Item = Self> {
         let line = |pair: Unseparated| Self { numbers: pair.names, correlation: pair.correlation };
-        state.unseparated().into_iter().map(line)
+        pairs.into_iter().map(line)
     }
 }
 

@@ -66,7 +66,7 @@ pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
         method: args.method,
     };
     let cure = settings.plan(&progress)?;
-    write_plan(folder, &cure.glass_plan())?;
+    write_plan(folder, &cure.glass_plan()?)?;
     progress.wrote(&args.output, &[]);
     cure.cured().lines().iter().for_each(|line| progress.say(line));
     Ok(())

@@ -1,6 +1,6 @@
 //! `lamp print-sim`: prints a job on a simulated machine, and measures the print.
 
-mod columns;
+mod glass;
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_pipeline::documents::{document, is_file, own_file};
-use lamp_pipeline::glass::is_column_job;
+use lamp_pipeline::glass::job_kind;
 use lamp_pipeline::heights::significant;
 use lamp_pipeline::memory;
 use lamp_planning::learn::{PrintError, PrintMeasurements};
@@ -42,12 +42,13 @@ const MOST_PLACES: usize = 10_000;
 /// --measured reads: the wrong pixels of each layer, or with --heights the heights of faces that
 /// look down. So the whole loop of printing and learning runs without a machine.
 ///
-/// A job of column cure is measured by the heights of its columns: of all, or with --heights of that
-/// many random ones.
+/// A job of column cure or ecpl is measured by the heights of columns on the glass: of all, or with
+/// --heights of that many random ones.
 ///
 /// A truth is a TOML file. Each key is a change, such as "+25%", or a value: penetration-depth,
-/// critical-dose, light, spread; drift is the change of the light from print to print. Left out
-/// keys are as in the job's material, or as in another one that the key material names.
+/// critical-dose, light, spread; for ecpl oxygen and critical-conversion instead of critical-dose;
+/// drift is the change of the light from print to print. Left out keys are as in the job's material,
+/// or as in another one that the key material names.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -69,7 +70,7 @@ pub(crate) struct PrintSimArgs {
     print: Option<usize>,
 
     /// Measure heights at this many random places of faces that look down, instead of wrong pixels;
-    /// with column cure at this many random columns, instead of all
+    /// on a glass at this many random columns, instead of all
     #[arg(long, value_name = "N", value_parser = parse_places)]
     heights: Option<usize>,
 
@@ -154,8 +155,8 @@ pub(crate) fn run(args: &PrintSimArgs, common: &Common) -> Result<(), Exit> {
     };
     let material = truth.material.as_deref().map(|word| document(&args.beside_truth(word)));
     let material: Option<Material> = material.transpose()?;
-    if is_column_job(&args.job) {
-        return columns::run(args, &truth, truth_name, material, &progress);
+    if let Some(kind) = job_kind(&args.job) {
+        return glass::run(kind, args, &truth, truth_name, material, &progress);
     }
     args.check_noise()?;
     let job = open(&args.job, &progress)?;

@@ -1,11 +1,8 @@
 //! Simulates what bitmaps of discs and rings cure by the kinetics of resin and oxygen (003).
 
-use anyhow::anyhow;
-use lamp_pipeline::glass::{CuredRings, RingsReport, kinetic_setting, map_grid};
-use lamp_planning::ShownBitmap;
-use lamp_planning::ecpl::{RingExposure, RingSimulation, WantedProfile};
+use lamp_pipeline::glass::{CuredRings, RingsReport, kinetic_setting, map_grid, rings_shown};
+use lamp_planning::ecpl::{RingSimulation, WantedProfile};
 use lamp_planning::target::Round;
-use lamp_stack::Image;
 
 use super::{ShownExposures, SimulatedBitmaps, SimulatedCure, SimulationOutcome};
 use crate::exit::Exit;
@@ -15,8 +12,7 @@ pub(super) fn cured(shown: &ShownExposures) -> Result<SimulationOutcome, Exit> {
     let ShownExposures { exposures, projector, material, target } = shown;
     let setting = kinetic_setting(projector, material)?;
     let place = || exposures.name.clone();
-    let bitmaps = (1..).zip(&exposures.bitmaps).map(exposure).collect::<Result<Vec<_>, _>>();
-    let bitmaps = bitmaps.map_err(|error| error.at(place()))?;
+    let bitmaps = rings_shown(&exposures.bitmaps).map_err(|error| error.at(place()))?;
     let round = match target {
         Some(target) => Some(target.profile()?),
         None => None,
@@ -47,12 +43,4 @@ pub(super) fn cured(shown: &ShownExposures) -> Result<SimulationOutcome, Exit> {
 
 fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Exit {
     Exit::Failed(error.into())
-}
-
-fn exposure((of, bitmap): (usize, &ShownBitmap)) -> Result<RingExposure, Exit> {
-    let Image::Mask(mask) = &bitmap.image else {
-        let text = format!("bitmap {of} has gray levels: kinetics take black and white ones");
-        return Err(Exit::Failed(anyhow!(text)));
-    };
-    RingExposure::shown(mask, bitmap.time).map_err(|error| failed(error).at(format!("bitmap {of}")))
 }

@@ -1,8 +1,8 @@
-//! Jobs of column cure: a plan, its prints, and what their heights show.
+//! Jobs of plans on a glass: a plan, its prints, and what their heights show.
 //!
 //! ```text
 //! job.toml                what the job is for: its part, its settings
-//! target.png              the wanted heights
+//! target.png              the wanted heights, or the target's file
 //! material.toml           the resin
 //! projector.toml          the projector
 //! print-000.tif           the bitmaps of the first print
@@ -17,42 +17,126 @@ use std::path::{Path, PathBuf};
 
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
-use lamp_planning::column::Setup;
+use lamp_planning::ShownBitmap;
 use lamp_planning::learn::{
-    ColumnFit, ColumnLight, Columns, HeightRow, JobError, JobFile, LightState, PrintMeasurements,
+    GlassFit, GlassModel, GlassState, HeightRow, JobError, JobFile, PrintMeasurements,
     digest_of_stack, measured_name, print_to_learn_from, requested_print, sealed_text, take_back,
 };
 use lamp_planning::projector::Projector;
-use lamp_planning::target::{Grid, HeightMap, MapScale, Target, TargetOptions};
-use lamp_planning::{MirrorSeconds, ShownBitmap};
-use lamp_stack::{Catalogued, Length, Page, sealed};
+use lamp_planning::target::{Grid, MapScale, Target, TargetOptions};
+use lamp_stack::{Catalogued, Page, sealed};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::column_cure::{ColumnCure, ColumnCureSettings, PlanInputs, flat_field};
+use super::GlassPlan;
 use super::target::of_work;
-use crate::documents::open_stack;
+use crate::documents::{open_stack, read_text};
 use crate::error::Error;
 use crate::watcher::Watcher;
 
 const PROJECTOR: &str = "projector.toml";
+/// Settings are texts of a few kilobytes.
+const MAX_SETTINGS: u64 = 1 << 20;
 
-/// The purpose of a job of column cure.
+/// The kinds of plans on a glass that a job can begin with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GlassKind {
+    /// By doses of columns, as `lamp plan column-cure` plans.
+    ColumnCure,
+    /// By kinetics, as `lamp plan ecpl` plans.
+    Ecpl,
+}
+
+/// The settings of a planner on a glass, from which its plan can be made again in another state of
+/// light and resin.
+pub trait GlassSettings: Clone + Serialize + DeserializeOwned {
+    /// The model that the planner has of light and resin.
+    type Model: GlassModel;
+
+    /// The kind of its plans.
+    const KIND: GlassKind;
+
+    /// Returns the names of the files that are kept beside the settings, the target's first, with
+    /// the folder that has them.
+    fn kept_files(&mut self) -> Vec<&mut PathBuf>;
+
+    /// Returns the model of a projector and a material.
+    ///
+    /// # Errors
+    /// Returns an error if they lack what the model needs, or if the target cannot be read.
+    fn model(&self, projector: &Projector, material: &Material) -> Result<Self::Model, Error>;
+
+    /// Returns the light of bitmaps.
+    ///
+    /// # Errors
+    /// Returns an error if the model cannot take these bitmaps.
+    fn light(
+        &self,
+        model: &Self::Model,
+        projector: &Projector,
+        bitmaps: &[ShownBitmap],
+    ) -> Result<<Self::Model as GlassModel>::Light, Error>;
+
+    /// Returns plans for a state of light and resin, as the settings of a job ask: one or more, of
+    /// which the best is printed.
+    ///
+    /// # Errors
+    /// Returns an error if there is no plan.
+    fn next(
+        &self,
+        job: &GlassJob<Self>,
+        state: &GlassState,
+        command: &str,
+        watcher: &dyn Watcher,
+    ) -> Result<Vec<GlassPlan>, Error>;
+}
+
+/// The settings of a plan, as its folder keeps them.
+#[derive(Serialize, Deserialize)]
+struct KeptSettings<S> {
+    kind: GlassKind,
+    #[serde(flatten)]
+    settings: S,
+}
+
+/// The files of a plan's folder from which the plan can be made again.
+#[derive(Clone, Debug)]
+pub struct PlanInputs<S> {
+    /// The settings, with the names of the other files.
+    pub settings: S,
+    /// The files that the settings name.
+    pub files: Vec<(String, Vec<u8>)>,
+}
+
+/// The name of the settings in a plan's folder.
+const SETTINGS: &str = "plan.toml";
+const BITMAPS: &str = "bitmaps.tif";
+
+impl<S: GlassSettings> PlanInputs<S> {
+    /// Returns the files, by their names.
+    ///
+    /// # Errors
+    /// Returns an error if a path of the settings is not text.
+    pub(super) fn files(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        let kept = KeptSettings { kind: S::KIND, settings: &self.settings };
+        let settings = toml::to_string(&kept).map_err(of_work)?;
+        let settings = (SETTINGS.to_owned(), settings.into_bytes());
+        Ok(std::iter::once(settings).chain(self.files.iter().cloned()).collect())
+    }
+}
+
+/// The purpose of a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ColumnJobFile {
-    kind: Kind,
+struct GlassJobFile<S> {
+    kind: GlassKind,
     /// The name of the part.
     part: String,
     /// The digest of the target's file.
     target_digest: String,
     /// The settings of the plan.
-    plan: ColumnCureSettings,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Kind {
-    ColumnCure,
+    plan: S,
 }
 
 /// The record of a print.
@@ -63,64 +147,97 @@ struct PrintFile {
     bitmaps: String,
     /// The state that they are planned for, if prints had shown one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    state: Option<LightState>,
+    state: Option<GlassState>,
 }
 
 /// A print of a job.
 #[derive(Clone, Debug)]
-pub struct ColumnJobPrint {
+pub struct GlassJobPrint<L> {
     /// The light of its bitmaps.
-    pub light: ColumnLight,
+    pub light: L,
     /// How long all bitmaps take, in seconds.
     pub seconds: f64,
     /// The measurements, and their text.
     pub measured: Option<(PrintMeasurements, String)>,
     /// The state that it was planned for, if prints had shown one.
-    pub state: Option<LightState>,
+    pub state: Option<GlassState>,
 }
 
-/// A job of column cure that is open.
+/// A print of a job, by the job's settings.
+type PrintOf<S> = GlassJobPrint<<<S as GlassSettings>::Model as GlassModel>::Light>;
+
+/// A job of a plan on a glass that is open.
 #[derive(Debug)]
-pub struct ColumnJob {
+pub struct GlassJob<S: GlassSettings> {
     folder: PathBuf,
-    file: ColumnJobFile,
-    /// The target, the projector and the resin at the start.
-    pub columns: Columns,
+    part: String,
+    /// The settings of the plan, with the target in the job's folder.
+    pub(super) settings: S,
+    /// The settings as the plan's folder had them.
+    pub(super) given: S,
+    /// The projector at the start.
+    pub projector: Projector,
+    /// The resin at the start.
+    pub material: Material,
+    /// The target, and the light and resin at the start.
+    pub model: S::Model,
     /// All prints, the last of which is to be measured.
-    pub prints: Vec<ColumnJobPrint>,
+    pub prints: Vec<PrintOf<S>>,
 }
 
 /// The state that the prints show, and the next plan.
 #[derive(Debug)]
-pub struct ColumnLesson {
+pub struct GlassLesson {
     /// The state before the print was measured.
-    pub before: LightState,
+    pub before: GlassState,
     /// The state after.
-    pub fit: ColumnFit,
+    pub fit: GlassFit,
     /// The standard deviation of the heights in micrometers, as their residuals show it.
     pub noise_um: f64,
     /// The next plan.
-    pub next: ColumnCure,
+    pub next: GlassPlan,
     /// The root mean square error that the next print is expected to have, measured at the same
     /// places, in micrometers: its mean, and the ends of the interval of 95 % of the states.
     pub expected_um: [f64; 3],
 }
 
-/// Returns true if a folder has a job of column cure.
-pub fn is_column_job(folder: &Path) -> bool {
-    read_job_file(folder).is_ok()
+/// The kind of a file of a job, or of settings.
+#[derive(Deserialize)]
+struct OfKind {
+    kind: GlassKind,
 }
 
-fn read_job_file(folder: &Path) -> Result<ColumnJobFile, Error> {
-    let file = folder.join(JobFile::NAME);
+/// Returns the kind of the plan on a glass that a folder has a job of, if it has one.
+pub fn job_kind(folder: &Path) -> Option<GlassKind> {
+    let text = sealed_text(&folder.join(JobFile::NAME), "a job's file").ok()?;
+    toml::from_str::<OfKind>(&text).ok().map(|file| file.kind)
+}
+
+/// Returns the kind of the plan on a glass that a folder has.
+///
+/// # Errors
+/// Returns an error if it has no settings.
+pub fn plan_kind(plan: &Path) -> Result<GlassKind, Error> {
+    let file = plan.join(SETTINGS);
+    let text = settings_text(plan)?;
+    let of_kind = toml::from_str::<OfKind>(&text);
+    of_kind.map(|of| of.kind).map_err(|error| of_work(error).at(file.display().to_string()))
+}
+
+fn settings_text(plan: &Path) -> Result<String, Error> {
+    let file = plan.join(SETTINGS);
     if !file.exists() {
-        return Err(of_work(JobError::NoJob(folder.to_owned())));
+        let plan = plan.display();
+        return Err(Error::work(format!(
+            "{plan}: there is no {SETTINGS}: plan again by lamp plan column-cure or lamp plan ecpl, \
+             which write it"
+        )));
     }
-    parsed(&file, "a job's file")
+    read_text(&file, MAX_SETTINGS, "a plan's settings")
 }
 
 /// Reads a sealed file.
-fn parsed<T: serde::de::DeserializeOwned>(file: &Path, what: &'static str) -> Result<T, Error> {
+fn parsed<T: DeserializeOwned>(file: &Path, what: &'static str) -> Result<T, Error> {
     let text = sealed_text(file, what).map_err(of_work)?;
     toml::from_str(&text).map_err(|error| of_work(error).at(file.display().to_string()))
 }
@@ -133,53 +250,57 @@ fn record_name(print: usize) -> String {
     format!("print-{print:03}.toml")
 }
 
-impl ColumnJob {
+impl GlassLesson {
     /// The least deviation of a height map's pixels, in micrometers: the residuals of the fit raise
     /// it.
     pub const MAP_SD_UM: f64 = 0.1;
+}
 
+impl<S: GlassSettings> GlassJob<S> {
     /// Returns the files of a new job of a plan's folder, by their names, for a projector and a
     /// material.
     ///
     /// # Errors
-    /// Returns an error if the folder lacks a file, or if the material does not state how deep a
-    /// dose cures.
+    /// Returns an error if the folder lacks a file, or if projector and material lack what the
+    /// model needs.
     pub fn begun(
         plan: &Path,
         projector: &Projector,
         material: &Material,
     ) -> Result<Vec<(String, Vec<u8>)>, Error> {
-        let at = |name: &str| plan.join(name);
-        let read = |name: &str| {
-            let file = at(name);
-            fs::read(&file).map_err(|error| Error::from(error).at(file.display().to_string()))
+        let read = |file: &Path| {
+            fs::read(file).map_err(|error| Error::from(error).at(file.display().to_string()))
         };
-        lamp_planning::column::HeightCurve::of(material).map_err(of_work)?;
-        let settings = at(PlanInputs::SETTINGS);
-        if !settings.exists() {
-            let (plan, file) = (plan.display(), PlanInputs::SETTINGS);
-            return Err(Error::work(format!(
-                "{plan}: there is no {file}: plan again by lamp plan column-cure, which writes it"
-            )));
+        let kept: KeptSettings<S> = toml::from_str(&settings_text(plan)?)
+            .map_err(|error| of_work(error).at(plan.join(SETTINGS).display().to_string()))?;
+        let mut there = kept.settings.clone();
+        let (mut files, mut target_digest) = (Vec::new(), None);
+        for path in there.kept_files() {
+            let name = path.to_string_lossy().into_owned();
+            // A name may neither lead out of the folder nor replace another file of the job.
+            let is_kept = path.file_name() == Some(path.as_os_str())
+                && (name.starts_with("target") || name.starts_with("flat-field"));
+            if !is_kept {
+                let settings = plan.join(SETTINGS);
+                let text = format!("`{name}` is not a file of a plan's folder: plan again");
+                return Err(Error::work(text).at(settings.display().to_string()));
+            }
+            *path = plan.join(&*path);
+            if target_digest.is_none() {
+                target_digest = Some(digest_of_stack(path).map_err(of_work)?);
+            }
+            files.push((name, read(path)?));
         }
-        let text = crate::documents::read_text(&settings, 1 << 20, "a plan's settings")?;
-        let settings: ColumnCureSettings = toml::from_str(&text)
-            .map_err(|error| of_work(error).at(settings.display().to_string()))?;
-        let bitmaps = at("bitmaps.tif");
-        let part = part_of(&bitmaps)?;
-        let target = read(PlanInputs::TARGET)?;
-        let file = ColumnJobFile {
-            kind: Kind::ColumnCure,
-            part,
-            target_digest: digest_of_stack(&at(PlanInputs::TARGET)).map_err(of_work)?,
-            plan: settings,
+        there.model(projector, material)?;
+        let bitmaps = plan.join(BITMAPS);
+        let file = GlassJobFile {
+            kind: S::KIND,
+            part: part_of(&bitmaps)?,
+            target_digest: target_digest.unwrap_or_default(),
+            plan: kept.settings,
         };
         let record =
             PrintFile { bitmaps: digest_of_stack(&bitmaps).map_err(of_work)?, state: None };
-        let mut files = vec![(PlanInputs::TARGET.to_owned(), target)];
-        if file.plan.flat_field.is_some() {
-            files.push((PlanInputs::FLAT_FIELD.to_owned(), read(PlanInputs::FLAT_FIELD)?));
-        }
         let text = |text: Result<String, toml::ser::Error>| -> Result<Vec<u8>, Error> {
             Ok(sealed(&text.map_err(of_work)?).into_bytes())
         };
@@ -187,7 +308,7 @@ impl ColumnJob {
             (JobFile::NAME.to_owned(), text(toml::to_string(&file))?),
             (JobFile::MATERIAL.to_owned(), text(toml::to_string(material))?),
             (PROJECTOR.to_owned(), text(toml::to_string(projector))?),
-            (bitmaps_name(0), read("bitmaps.tif")?),
+            (bitmaps_name(0), read(&bitmaps)?),
             (record_name(0), text(toml::to_string(&record))?),
         ]);
         Ok(files)
@@ -198,19 +319,31 @@ impl ColumnJob {
     /// # Errors
     /// Returns an error if a file of the job is missing, was changed or does not fit the others.
     pub fn open(folder: &Path) -> Result<Self, Error> {
-        let mut file = read_job_file(folder)?;
-        let at = |name: &str| folder.join(name);
-        let target = at(PlanInputs::TARGET);
-        check_digest(&target, &file.target_digest)?;
-        let material = catalogued::<Material>(&at(JobFile::MATERIAL), "a material file")?;
-        let projector = catalogued::<Projector>(&at(PROJECTOR), "a projector file")?;
-        file.plan.target.target = target;
-        if file.plan.flat_field.is_some() {
-            file.plan.flat_field = Some(at(PlanInputs::FLAT_FIELD));
+        let file = folder.join(JobFile::NAME);
+        if !file.exists() {
+            return Err(of_work(JobError::NoJob(folder.to_owned())));
         }
-        let wanted = wanted_of(&file.plan, &projector)?;
-        let columns = Columns { projector, material, wanted, tracing: file.plan.rays };
-        let mut job = Self { folder: folder.to_owned(), file, columns, prints: Vec::new() };
+        let file: GlassJobFile<S> = parsed(&file, "a job's file")?;
+        let mut settings = file.plan.clone();
+        for (number, path) in settings.kept_files().into_iter().enumerate() {
+            *path = folder.join(&*path);
+            if number == 0 {
+                check_digest(path, &file.target_digest)?;
+            }
+        }
+        let material = catalogued::<Material>(&folder.join(JobFile::MATERIAL), "a material file")?;
+        let projector = catalogued::<Projector>(&folder.join(PROJECTOR), "a projector file")?;
+        let model = settings.model(&projector, &material)?;
+        let mut job = Self {
+            folder: folder.to_owned(),
+            part: file.part,
+            settings,
+            given: file.plan,
+            projector,
+            material,
+            model,
+            prints: Vec::new(),
+        };
         while job.folder.join(record_name(job.prints.len())).exists() {
             let print = job.read_print(job.prints.len())?;
             job.prints.push(print);
@@ -222,7 +355,7 @@ impl ColumnJob {
         Ok(job)
     }
 
-    fn read_print(&self, number: usize) -> Result<ColumnJobPrint, Error> {
+    fn read_print(&self, number: usize) -> Result<PrintOf<S>, Error> {
         let at = |name: String| self.folder.join(name);
         let record: PrintFile = parsed(&at(record_name(number)), "the record of a print")?;
         let bitmaps = at(bitmaps_name(number));
@@ -238,14 +371,14 @@ impl ColumnJob {
             Ok((table, text))
         };
         let measured = is_learnt_from.then(read).transpose()?;
-        Ok(ColumnJobPrint { light, seconds, measured, state: record.state })
+        Ok(GlassJobPrint { light, seconds, measured, state: record.state })
     }
 
     /// Returns the light of bitmaps, and how long all take, in seconds.
-    fn shown(&self, path: &Path) -> Result<(ColumnLight, f64), Error> {
+    fn shown(&self, path: &Path) -> Result<(<S::Model as GlassModel>::Light, f64), Error> {
         let named = |error: Error| error.at(path.display().to_string());
         let mut bitmaps: Vec<ShownBitmap> = Vec::new();
-        let display = &self.columns.projector.display;
+        let display = &self.projector.display;
         for page in open_stack(path)? {
             let layer = page.and_then(Page::decode).map_err(|error| named(error.into()))?;
             let time = ExposureTime::from_ms(layer.info.exposure_ms.unwrap_or_default());
@@ -254,29 +387,27 @@ impl ColumnJob {
                 let (width, height) = (image.width(), image.height());
                 return Err(named(Error::work(format!(
                     "{width} x {height} pixels, but the display of {} has {} x {} mirrors",
-                    self.columns.projector.name, display.columns, display.rows
+                    self.projector.name, display.columns, display.rows
                 ))));
             }
             bitmaps.push(ShownBitmap { image, time });
         }
         let seconds = bitmaps.iter().map(|bitmap| bitmap.time.ms()).sum::<f64>() / 1000.0;
-        let projector = &self.columns.projector;
-        let shown = MirrorSeconds::of(&bitmaps, |level| projector.share(level));
-        let flat_field = match &self.file.plan.flat_field {
-            Some(path) => {
-                let of_display =
-                    Setup::of(projector, &self.columns.wanted.grid, self.columns.tracing);
-                let setup = Setup { mirrors: shown.mirrors, ..of_display };
-                flat_field(path, &setup).map_err(|error| error.at(path.display().to_string()))?
-            }
-            None => Vec::new(),
-        };
-        Ok((ColumnLight { shown, flat_field }, seconds))
+        let light = self.settings.light(&self.model, &self.projector, &bitmaps).map_err(named)?;
+        Ok((light, seconds))
+    }
+
+    /// Returns the job's model for another material.
+    ///
+    /// # Errors
+    /// Returns an error if the material lacks what the model needs.
+    pub fn model_of(&self, material: &Material) -> Result<S::Model, Error> {
+        self.settings.model(&self.projector, material)
     }
 
     /// Returns the name of the part.
     pub fn part(&self) -> &str {
-        &self.file.part
+        &self.part
     }
 
     /// Returns the print that is requested: the last one, if none is.
@@ -321,14 +452,14 @@ impl ColumnJob {
                 rounded_mm(grid.x_um(at % grid.columns)),
                 rounded_mm(grid.y_um(at / grid.columns)),
             ];
-            // Light reaches no pixel beyond the columns.
-            let Some(column) = self.columns.column_at(place_mm) else { continue };
+            // Light reaches no pixel beyond the model's grid.
+            let Some(wanted_um) = self.model.wanted_um(place_mm) else { continue };
             rows.push(HeightRow {
                 line: rows.len() + 2,
                 place_mm,
-                z_mm: rounded_mm(self.columns.wanted.heights_um[column]),
+                z_mm: rounded_mm(wanted_um),
                 measured_mm: rounded_mm(*um),
-                sd_um: Self::MAP_SD_UM,
+                sd_um: GlassLesson::MAP_SD_UM,
             });
         }
         Ok(PrintMeasurements::Heights(rows))
@@ -337,42 +468,37 @@ impl ColumnJob {
     /// Learns from the measurements of a print, and plans the next.
     ///
     /// # Errors
-    /// Returns an error if these are not heights of columns, or if there is no plan.
+    /// Returns an error if these are not heights, or if there is no plan.
     pub fn learn(
         &self,
         print: usize,
         measured: &PrintMeasurements,
         watcher: &dyn Watcher,
-    ) -> Result<ColumnLesson, Error> {
+    ) -> Result<GlassLesson, Error> {
         let PrintMeasurements::Heights(rows) = measured else {
-            return Err(Error::work("a plan of columns learns from heights, not from layers"));
+            return Err(Error::work("a plan on a glass learns from heights, not from layers"));
         };
         let earlier = self.prints[..print].iter().filter_map(|print| match &print.measured {
             Some((PrintMeasurements::Heights(rows), _)) => Some((&print.light, &rows[..])),
             _ => None,
         });
         let all: Vec<_> = earlier.chain([(&self.prints[print].light, &rows[..])]).collect();
-        let fit = self.columns.fit(&all).map_err(of_work)?;
-        let Columns { projector, material, .. } = self.columns.in_state(&fit.state);
-        let words = (projector.name.clone(), material.name.clone());
-        let mut next =
-            self.file.plan.plan_for((projector, words.0), (material, words.1), watcher)?;
-        next.target.clone_from(&self.file.part);
-        next.command = format!("lamp learn --print {print}");
-        // The next plan's folder is one that a job can begin with.
-        next.inputs.settings.projector.clone_from(&self.file.plan.projector);
-        next.inputs.settings.material.clone_from(&self.file.plan.material);
-        let setup = next.light.setup();
-        let shown = MirrorSeconds { mirrors: setup.mirrors, seconds: next.plan.seconds.clone() };
-        let light = ColumnLight { shown, flat_field: setup.flat_field.clone() };
-        let expected_um = self.columns.expected_um(&fit, &light, rows).map_err(of_work)?;
+        let fit = self.model.fit(&all).map_err(of_work)?;
+        let command = format!("lamp learn --print {print}");
+        let plans = self.settings.next(self, &fit.state, &command, watcher)?;
+        let mut best: Option<(GlassPlan, [f64; 3])> = None;
+        for plan in plans {
+            let light = self.settings.light(&self.model, &self.projector, &plan.bitmaps)?;
+            let expected_um = self.model.expected_um(&fit, &light, rows).map_err(of_work)?;
+            if best.as_ref().is_none_or(|(_, least_um)| expected_um[0] < least_um[0]) {
+                best = Some((plan, expected_um));
+            }
+        }
+        let Some((next, expected_um)) = best else { return Err(Error::work("there is no plan")) };
         let squares: f64 = rows.iter().map(|row| row.sd_um * row.sd_um).sum();
         let noise_um = fit.misfit * (squares / rows.len().max(1) as f64).sqrt();
-        let before = self.prints[print].state.clone();
-        let before = before.unwrap_or_else(|| {
-            LightState::of_glass(&self.columns.projector, &self.columns.material)
-        });
-        Ok(ColumnLesson { before, fit, noise_um, next, expected_um })
+        let before = self.prints[print].state.clone().unwrap_or_else(|| self.model.prior());
+        Ok(GlassLesson { before, fit, noise_um, next, expected_um })
     }
 
     /// Returns the file of a print's bitmaps.
@@ -389,7 +515,7 @@ impl ColumnJob {
         &self,
         print: usize,
         text: &str,
-        lesson: &ColumnLesson,
+        lesson: &GlassLesson,
     ) -> Result<Vec<(PathBuf, String)>, Error> {
         let bitmaps = digest_of_stack(&self.bitmaps_file(print + 1)).map_err(of_work)?;
         let record = PrintFile { bitmaps, state: Some(lesson.fit.state.clone()) };
@@ -406,7 +532,7 @@ impl ColumnJob {
     ///
     /// # Errors
     /// Returns an error if they differ.
-    pub fn check_again(&self, print: usize, lesson: &ColumnLesson) -> Result<(), Error> {
+    pub fn check_again(&self, print: usize, lesson: &GlassLesson) -> Result<(), Error> {
         let name = record_name(print + 1);
         let record: PrintFile = parsed(&self.folder.join(&name), "the record of a print")?;
         match record.state.as_ref() == Some(&lesson.fit.state) {
@@ -417,20 +543,6 @@ impl ColumnJob {
             }
         }
     }
-}
-
-/// Returns the target's columns, with room for the projector's light around it.
-fn wanted_of(plan: &ColumnCureSettings, projector: &Projector) -> Result<HeightMap, Error> {
-    let scale = plan.target.pixel.zip(plan.target.full);
-    let scale = scale.map(|(pixel, full)| MapScale { pixel, full });
-    let options = TargetOptions { scale, ..TargetOptions::default() };
-    let named = |error: Error| error.at(plan.target.target.display().to_string());
-    let target =
-        Target::open(&plan.target.target, &options).map_err(|error| named(of_work(error)))?;
-    let voxel = plan.voxel.unwrap_or_else(|| Length::from_um(projector.pitch.value.um()));
-    let grid = Setup::grid_around(projector, target.size(), voxel)
-        .map_err(|error| named(of_work(error)))?;
-    target.heights(&grid).map_err(|error| named(of_work(error)))
 }
 
 /// Returns the part of a plan's bitmaps.

@@ -1,25 +1,29 @@
-//! Jobs of column cure: plans of bitmaps, corrected after every print by the heights of its columns.
+//! Jobs of plans on a glass: bitmaps, corrected after every print by the heights of its part.
 
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
 use lamp_grayscale::material::Material;
 use lamp_pipeline::documents::document;
-use lamp_pipeline::glass::{ColumnJob, ColumnJobPrint, ColumnLesson, GlassPlan};
+use lamp_pipeline::glass::{
+    ColumnCureSettings, EcplSettings, GlassJob, GlassKind, GlassLesson, GlassSettings, plan_kind,
+};
 use lamp_pipeline::heights::{significant, time_text};
-use lamp_planning::learn::{JobFile, LightState, PrintMeasurements};
+use lamp_planning::learn::{GlassNumber, JobFile, PrintMeasurements};
 use lamp_planning::projector::Projector;
 use lamp_planning::target::MapScale;
 use lamp_stack::{Destination, Format, write_stack};
 use serde::Serialize;
 
+use super::plot::plots_of_glass;
 use super::report::{MISFIT, PrintLine, StateLine, UnseparatedLine, WORSE, state_line};
-use super::{LearnArgs, check_outside_job, read_measured};
+use super::{LearnArgs, read_measured};
 use crate::exit::Exit;
 use crate::output::json_report::{JsonReport, schemas};
 use crate::output::plan_folder::{plan_folder, write_plan};
-use crate::streams::{check_beside, extension, input_name, new_folder, print, write_file};
+use crate::streams::{extension, input_name, new_folder, print, write_file};
 use crate::terminal::progress::Progress;
+use lamp_plots as plots;
 
 /// Begins a job with a plan's folder.
 pub(super) fn begin(
@@ -47,14 +51,29 @@ pub(super) fn begin(
             "{folder} has a job already: leave out --start, or name another folder"
         )));
     }
+    match plan_kind(plan)? {
+        GlassKind::ColumnCure => {
+            begin_of::<ColumnCureSettings>(folder, plan, projector, material, progress)
+        }
+        GlassKind::Ecpl => begin_of::<EcplSettings>(folder, plan, projector, material, progress),
+    }
+}
+
+fn begin_of<S: GlassSettings>(
+    folder: &Path,
+    plan: &Path,
+    projector: &Path,
+    material: &Path,
+    progress: &Progress,
+) -> Result<(), Exit> {
     let (projector, material): (Projector, Material) = (document(projector)?, document(material)?);
     let new = new_folder(folder, false)?;
-    for (name, bytes) in ColumnJob::begun(plan, &projector, &material)? {
+    for (name, bytes) in GlassJob::<S>::begun(plan, &projector, &material)? {
         new.add(&name, |out| out.write_all(&bytes))
             .with_context(|| folder.display().to_string())?;
     }
     // Opened before it has its name, so that no job is begun whose files contradict each other.
-    ColumnJob::open(new.path())?;
+    GlassJob::<S>::open(new.path())?;
     new.persist().map_err(|error| Exit::Failed(error.into()).at(folder.display().to_string()))?;
     progress.say(&format!(
         "{} is begun: print 0 has the bitmaps of {}",
@@ -66,20 +85,29 @@ pub(super) fn begin(
 
 /// Learns from the heights of a print.
 pub(super) fn run(
+    kind: GlassKind,
     args: &LearnArgs,
     measured: &Path,
     output: &Path,
     progress: &Progress,
 ) -> Result<(), Exit> {
-    if args.law.is_some() || args.plot.is_some() {
-        return Err(Exit::usage("--law and --plot are for jobs of stacks: leave them out"));
+    match kind {
+        GlassKind::ColumnCure => run_of::<ColumnCureSettings>(args, measured, output, progress),
+        GlassKind::Ecpl => run_of::<EcplSettings>(args, measured, output, progress),
     }
-    check_outside_job(&args.job, output)?;
-    if let Some(report) = args.report.path() {
-        check_outside_job(&args.job, report)?;
-        check_beside(report, Path::new("-"), [&measured.to_owned()])?;
+}
+
+fn run_of<S: GlassSettings>(
+    args: &LearnArgs,
+    measured: &Path,
+    output: &Path,
+    progress: &Progress,
+) -> Result<(), Exit> {
+    if args.law.is_some() {
+        return Err(Exit::usage("--law is for jobs of stacks: leave it out"));
     }
-    let mut job = ColumnJob::open(&args.job)?;
+    args.check_outputs(measured)?;
+    let mut job = GlassJob::<S>::open(&args.job)?;
     let next = plan_folder(output, false)?;
     let name = input_name(measured);
     let (measured, text) = read(args, &job, measured)?;
@@ -89,20 +117,23 @@ pub(super) fn run(
     let number = again.map_or_else(|| job.print_to_learn_from(args.print), Ok)?;
     let lesson =
         job.learn(number, &measured, progress).map_err(|error| Exit::from(error).at(name))?;
-    let plan = lesson.next.glass_plan()?;
     match again {
         Some(print) => {
             job.check_again(print, &lesson)?;
             progress.say(&format!("print {print} was used already: this is the same again"));
         }
-        None => keep(&job, number, &text, &lesson, &plan)?,
+        None => keep(&job, number, &text, &lesson)?,
     }
-    write_plan(next, &plan)?;
+    write_plan(next, &lesson.next)?;
     progress.wrote(output, &[]);
     // Read again, so that the report shows the job as it is on the disk.
-    let job = ColumnJob::open(&args.job)?;
+    let job = GlassJob::<S>::open(&args.job)?;
     if let Some(path) = args.report.path() {
         write_report(&job, number, &lesson, path)?;
+    }
+    if let Some(path) = &args.plot {
+        let bytes = plots::drawn(&plots_of_glass(&job), path)?;
+        write_file(path, |out| out.write_all(&bytes))?;
     }
     match args.report.is_printed() {
         true => Ok(()),
@@ -111,16 +142,15 @@ pub(super) fn run(
 }
 
 /// Keeps the measurements of a print and the next plan in the job.
-fn keep(
-    job: &ColumnJob,
+fn keep<S: GlassSettings>(
+    job: &GlassJob<S>,
     print: usize,
     text: &str,
-    lesson: &ColumnLesson,
-    plan: &GlassPlan,
+    lesson: &GlassLesson,
 ) -> Result<(), Exit> {
     let bitmaps = job.bitmaps_file(print + 1);
     let named = |error| Exit::from(error).at(bitmaps.display().to_string());
-    write_stack(plan.pages().layers(), Destination::File(bitmaps.clone()), Format::Big)
+    write_stack(lesson.next.pages().layers(), Destination::File(bitmaps.clone()), Format::Big)
         .map_err(named)?;
     for (file, text) in job.files_to_keep(print, text, lesson)? {
         write_file(&file, |out| out.write_all(text.as_bytes()))?;
@@ -129,9 +159,9 @@ fn keep(
 }
 
 /// Reads the heights of a print: a table, or a PNG with its scale.
-fn read(
+fn read<S: GlassSettings>(
     args: &LearnArgs,
-    job: &ColumnJob,
+    job: &GlassJob<S>,
     path: &Path,
 ) -> Result<(PrintMeasurements, String), Exit> {
     match (args.pixel.zip(args.full), extension(path).as_str()) {
@@ -148,13 +178,14 @@ fn read(
     }
 }
 
-/// Returns the error of a print that was measured, in micrometers.
-fn error_um(print: &ColumnJobPrint) -> Option<f64> {
-    print.measured.as_ref().map(|(measured, _)| measured.error().number())
+/// Returns the error of each print that was measured, in micrometers.
+fn errors_um<S: GlassSettings>(job: &GlassJob<S>) -> impl Iterator<Item = f64> {
+    let measured = job.prints.iter().filter_map(|print| print.measured.as_ref());
+    measured.map(|(measured, _)| measured.error().number())
 }
 
 /// Returns the print with the least error, among all prints that were measured as the last one was.
-fn best_of(job: &ColumnJob) -> Option<(usize, f64)> {
+fn best_of<S: GlassSettings>(job: &GlassJob<S>) -> Option<(usize, f64)> {
     let measured: Vec<_> = job
         .prints
         .iter()
@@ -168,9 +199,9 @@ fn best_of(job: &ColumnJob) -> Option<(usize, f64)> {
 }
 
 /// The lines that are printed.
-fn lines_of(job: &ColumnJob, number: usize, lesson: &ColumnLesson) -> String {
+fn lines_of<S: GlassSettings>(job: &GlassJob<S>, number: usize, lesson: &GlassLesson) -> String {
     let um = |error: f64| format!("{} um", significant(error));
-    let errors: Vec<_> = job.prints.iter().filter_map(error_um).map(um).collect();
+    let errors: Vec<_> = errors_um(job).map(um).collect();
     let prints = match number {
         0 => "error of print 0".to_owned(),
         _ => format!("errors of prints 0 to {number}"),
@@ -178,18 +209,19 @@ fn lines_of(job: &ColumnJob, number: usize, lesson: &ColumnLesson) -> String {
     let mut text = format!("{prints} (RMS of heights): {}\n", errors.join(", "));
     if let Some((best, least)) = best_of(job) {
         text += &format!("best print so far: {best}, {}\n", um(least));
-        let last = error_um(&job.prints[number]).filter(|last| *last > WORSE * least);
+        let last = errors_um(job).last().filter(|last| *last > WORSE * least);
         if let Some(last) = last {
             let last = um(last);
             text += &format!("warning: print {number} is worse than print {best}: {last}\n");
         }
     }
     let state = &lesson.fit.state;
-    let states = state.factors().into_iter().zip(lesson.before.factors());
-    for (name, (after, before)) in LightState::NAMES.into_iter().zip(states) {
-        text += &state_line(name, after, before);
+    for ((number, after), (_, before)) in state.factors().zip(lesson.before.factors()) {
+        text += &state_line(number.name(), after, before);
     }
-    text += "the dose is light over critical dose: heights show only their ratio\n";
+    if state.factors().any(|(number, _)| number == GlassNumber::Dose) {
+        text += "the dose is light over critical dose: heights show only their ratio\n";
+    }
     for pair in state.unseparated() {
         let [one, other] = pair.names;
         text += &format!("the measurements do not separate the {one} from the {other}\n");
@@ -214,12 +246,12 @@ fn lines_of(job: &ColumnJob, number: usize, lesson: &ColumnLesson) -> String {
 }
 
 /// Returns true if the measurements state how exact they are, and no state comes near them.
-fn is_unexplained(lesson: &ColumnLesson) -> bool {
+fn is_unexplained(lesson: &GlassLesson) -> bool {
     // Maps do not state it: their noise is what the residuals show.
-    lesson.fit.misfit > MISFIT && lesson.noise_um / lesson.fit.misfit > ColumnJob::MAP_SD_UM
+    lesson.fit.misfit > MISFIT && lesson.noise_um / lesson.fit.misfit > GlassLesson::MAP_SD_UM
 }
 
-/// Bitmaps learned from prints, by `lamp learn --report` of a plan of column cure.
+/// Bitmaps learned from prints, by `lamp learn --report` of a plan on a glass.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 struct LearnColumnsHead<'a> {
@@ -252,17 +284,17 @@ schemas! {
 }
 
 /// Writes the report.
-fn write_report(
-    job: &ColumnJob,
+fn write_report<S: GlassSettings>(
+    job: &GlassJob<S>,
     number: usize,
-    lesson: &ColumnLesson,
+    lesson: &GlassLesson,
     path: &Path,
 ) -> Result<(), Exit> {
     let [mean, low, high] = lesson.expected_um;
     let head = LearnColumnsHead {
         part: job.part(),
-        material: &job.columns.material.name,
-        projector: &job.columns.projector.name,
+        material: &job.material.name,
+        projector: &job.projector.name,
         print: number,
         best_print: best_of(job).map(|best| best.0),
         noise_um: lesson.noise_um,
@@ -274,9 +306,12 @@ fn write_report(
         let error = print.measured.as_ref().map(|(measured, _)| measured.error());
         PrintLine::new(number, print.seconds, error)
     });
+    let states = lesson.fit.state.factors().zip(lesson.before.factors());
+    let states =
+        states.map(|((number, after), (_, before))| StateLine::new(number.name(), after, before));
     JsonReport::of_schema("lamp-learn-columns-1", &head)
-        .list("state", StateLine::all(&lesson.fit.state, &lesson.before))
-        .list("unseparated", UnseparatedLine::all(&lesson.fit.state))
+        .list("state", states)
+        .list("unseparated", UnseparatedLine::all(lesson.fit.state.unseparated()))
         .list("prints", prints)
         .write(path)
 }
