@@ -1,5 +1,5 @@
-//! The state of light and resin of a plan on a glass: how far they are from the numbers of projector
-//! and material.
+//! The state of light and resin of a plan on a glass, as factors of the numbers of projector and
+//! material.
 
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +56,7 @@ impl GlassNumber {
     }
 }
 
-/// How far numbers of light and resin are from those of a projector and a material.
+/// Numbers of light and resin, as factors of the numbers of a projector and a material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GlassState {
