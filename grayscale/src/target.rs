@@ -1,6 +1,6 @@
 //! Images to expose and measure: squares for the cure width (002 section 3.4.3, figure
-//! 73), lines in two directions for the spread of light (002 sections 3.4.2.1 and 3.4.8) and
-//! screens for the homogeneous transition (002 section 3.3.6, figure 56).
+//! 73), lines in two directions for the spread of light (002 sections 3.4.2.1 and 3.4.8), lines on a
+//! glass for the rates of a reaction (003 section 4.4) and screens for the homogeneous transition (002 section 3.3.6, figure 56).
 
 use lamp_stack::{GrayMask, Mask, MaskBuilder};
 use thiserror::Error;
@@ -127,12 +127,7 @@ pub fn scan_lines(
     gap: u32,
     doses: &[Dose],
 ) -> Result<Vec<TargetExposure>, TargetError> {
-    check_pixels("gaps", gap, MAX_TILE)?;
-    check_pixels("lengths", length, MAX_PIXELS)?;
-    widths.iter().try_for_each(|&width| check_pixels("lines", width, MAX_TILE))?;
-    if !(1..=MAX_LINES).contains(&widths.len()) {
-        return Err(TargetError::Lines);
-    }
+    check_lines(widths, length, gap)?;
     if doses.is_empty() {
         return Err(TargetError::Doses);
     }
@@ -143,6 +138,47 @@ pub fn scan_lines(
         let mut mask = MaskBuilder::new(block.width().next_multiple_of(WIDTH_STEP));
         mask.push_black(first as u32 * block.height());
         (first..doses.len()).for_each(|_| block.push(&mut mask));
+        mask.finish()
+    })
+}
+
+/// Makes white lines of several `widths` (003 section 4.4), one block for each of `doses`, from the top. As
+/// for [`squares`], each exposure leaves out the blocks that have their dose.
+///
+/// In a block, lines stand side by side, from the left in the order of `widths`; they are `length`
+/// pixels long along the columns, with `gap` pixels of black between and around them.
+///
+/// # Errors
+/// Returns an error if there are no widths, no doses or too many, if doses do not go up from above
+/// zero, or if a length is zero or too large.
+pub fn lines(
+    widths: &[u32],
+    length: u32,
+    gap: u32,
+    doses: &[Dose],
+) -> Result<Vec<TargetExposure>, TargetError> {
+    check_lines(widths, length, gap)?;
+    if doses.is_empty() {
+        return Err(TargetError::Doses);
+    }
+    let rows = u64::from(length + gap) * doses.len() as u64 + u64::from(gap);
+    check_pixels("targets", rows.try_into().unwrap_or(u32::MAX), MAX_ROWS)?;
+    let mut changes = Vec::new();
+    for width in widths {
+        let left = changes.last().map_or(gap, |right| right + gap);
+        changes.extend([left, left + width]);
+    }
+    let across = changes.last().map_or(0, |right| right + gap);
+    exposures(doses, |first| {
+        let mut mask = MaskBuilder::new(across.next_multiple_of(WIDTH_STEP));
+        mask.push_black(gap);
+        for block in 0..doses.len() {
+            for _ in 0..length {
+                let row = if block < first { &[][..] } else { &changes };
+                mask.push_row(row).expect("lines stand side by side within the width");
+            }
+            mask.push_black(gap);
+        }
         mask.finish()
     })
 }
@@ -194,6 +230,14 @@ impl ScanBlock {
             mask.push_row(&row).expect("both directions stand side by side within the width");
         }
     }
+}
+
+fn check_lines(widths: &[u32], length: u32, gap: u32) -> Result<(), TargetError> {
+    check_pixels("gaps", gap, MAX_TILE)?;
+    check_pixels("lengths", length, MAX_PIXELS)?;
+    widths.iter().try_for_each(|&width| check_pixels("lines", width, MAX_TILE))?;
+    let fine = (1..=MAX_LINES).contains(&widths.len());
+    if fine { Ok(()) } else { Err(TargetError::Lines) }
 }
 
 fn check_pixels(what: &'static str, pixels: u32, most: u32) -> Result<(), TargetError> {
@@ -378,6 +422,31 @@ mod tests {
             assert_eq!(runs, [20, 2, 20, 7, 20, 31, 20, 20, 2, 20, 7, 20, 31, 20, 20]);
             assert_eq!([total(gap, top + gap - 1), total(gap, top + gap + length)], [0.0; 2]);
         }
+    }
+
+    #[test]
+    fn lines_of_each_block_get_their_dose() {
+        let ([gap, length], doses) = ([4, 6], doses(&[5.0, 10.0, 30.0]));
+        let exposures = lines(&[2, 9], length, gap, &doses).unwrap();
+        let image = &exposures[0].image;
+        assert_eq!((exposures.len(), image.width(), image.height()), (3, 32, 34));
+        for (block, dose) in (0..).zip(&doses) {
+            for y in 0..length {
+                for x in 0..32 {
+                    let white = exposures
+                        .iter()
+                        .filter(|e| e.image.is_white(x, gap + block * (length + gap) + y));
+                    let sum: f64 = white.map(|exposure| exposure.dose.mj_per_cm2()).sum();
+                    let lit = (4..6).contains(&x) || (10..19).contains(&x);
+                    assert_eq!(sum, if lit { dose.mj_per_cm2() } else { 0.0 }, "{block} {x} {y}");
+                }
+            }
+        }
+        let white: u64 = exposures.iter().map(|exposure| exposure.image.white_pixels()).sum();
+        assert_eq!(white, 11 * 6 * (3 + 2 + 1));
+        assert_eq!(lines(&[], 5, 5, &doses), Err(TargetError::Lines));
+        assert_eq!(lines(&[5], 5, 5, &[]), Err(TargetError::Doses));
+        assert!(lines(&[5], 50_000, 5, &[1.0; 9].map(Dose::from_mj_per_cm2)).is_err());
     }
 
     #[test]

@@ -139,8 +139,15 @@ fn kinetics() -> impl Strategy<Value = KineticNumbers> {
     let absorptivity = given(number().prop_map(Absorptivity::from_m2_per_mol));
     let diffusion = given(number().prop_map(Diffusivity::from_m2_per_s));
     let light = (given(um()), share(), absorptivity);
-    (light, (rate(), rate(), rate()), diffusion, (moles(), moles()), share()).prop_map(
-        |(light, rates, oxygen_diffusion, (oxygen, photoinitiator), critical_conversion)| {
+    (light, (rate(), rate(), rate()), diffusion, (moles(), moles()), share(), measured()).prop_map(
+        |(
+            light,
+            rates,
+            oxygen_diffusion,
+            (oxygen, photoinitiator),
+            critical_conversion,
+            measured,
+        )| {
             let (wavelength, quantum_efficiency, absorptivity) = light;
             let (propagation, termination, termination_by_oxygen) = rates;
             KineticNumbers {
@@ -154,6 +161,7 @@ fn kinetics() -> impl Strategy<Value = KineticNumbers> {
                 oxygen,
                 photoinitiator,
                 critical_conversion,
+                measured,
             }
         },
     )

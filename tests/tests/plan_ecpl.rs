@@ -1,8 +1,13 @@
-//! Checks the plans of `lamp plan ecpl`.
+//! Checks the plans of `lamp plan ecpl`, and the rates that `lamp calibrate kinetics` finds for them.
 
+use std::fmt::Write as _;
+
+use lamp_fixtures::SplitMix;
 use lamp_stack::{Image, Layer, Mask, PageInfo};
 use lamp_tests::{Scratch, masks, with_soft_edges};
 use serde_json::Value;
+
+use crate::plot_tables::is_as_in_the_book;
 
 /// A lens that plans quickly, and a projector that blurs by 8 um only.
 fn with_lens() -> Scratch {
@@ -175,4 +180,109 @@ fn what_cannot_be_cured_is_refused_in_a_sentence() {
     }
     scratch.run(&format!("{PLAN} -o plan")).succeeds();
     scratch.run(&format!("{PLAN} -o plan")).is_refused_with(&["plan", "--force"]);
+}
+
+/// Films of a resin with 30 % more oxygen than the material states, made by discs so wide that their middle
+/// is a film.
+#[test]
+fn films_show_how_much_oxygen_a_resin_has() {
+    let scratch = Scratch::new();
+    let tmpta = scratch.run("lamp material show tmpta").succeeds_quietly().stdout;
+    let truth = String::from_utf8(tmpta).unwrap().replace("1.05 mol/m3", "1.365 mol/m3");
+    scratch.write("truth.toml", truth.as_bytes());
+    let mut noise = SplitMix(3);
+    let mut table = "exposure_ms,height_um,note\n500,0,did not cure\n".to_owned();
+    for ms in [1500, 2000, 3000, 4000, 5000] {
+        let folder = format!("disc-{ms}");
+        let disc = format!(
+            "lamp plan simulate 60:{ms}ms --model kinetics --projector jariwala --material truth.toml -o {folder}"
+        );
+        scratch.run(&disc).succeeds();
+        let film_um = number(&report(&scratch, &folder), "/cured/sag_um");
+        for _ in 0..3 {
+            writeln!(table, "{ms},{:.2},", film_um + noise.normal()).unwrap();
+        }
+    }
+    scratch.write("films.csv", table.as_bytes());
+    let fit = "lamp calibrate kinetics films.csv --material tmpta --projector jariwala";
+    let outputs =
+        "--rates oxygen,absorptivity --name mine -o mine.toml --plot fit.csv --report fit.json";
+    scratch.run(&format!("{fit} {outputs}")).succeeds();
+    is_as_in_the_book(&scratch, "lamp calibrate kinetics", "fit.csv");
+    let answer: Value = serde_json::from_slice(&scratch.bytes("fit.json")).unwrap();
+    assert_eq!([&answer["points"], &answer["without_measure"]], [15, 1]);
+    for (name, truth) in [("oxygen", 1.365), ("absorptivity", 15.0)] {
+        let all = answer["parameters"].as_array().unwrap();
+        let rate = all.iter().find(|it| it["name"] == name).unwrap();
+        let [value, low, high] = ["value", "low", "high"].map(|key| rate[key].as_f64().unwrap());
+        assert!(low < truth && truth < high && (value / truth - 1.0).abs() < 0.1, "{rate}");
+    }
+    scratch.run("lamp material check mine.toml").succeeds();
+    let mine = String::from_utf8(scratch.bytes("mine.toml")).unwrap();
+    assert!(
+        mine.contains("[kinetics.measured") && mine.contains("from films.csv, 15 points"),
+        "{mine}"
+    );
+    // 003's rates: films do not show how radicals end each other.
+    let rates = "--rates propagation,termination,termination-by-oxygen";
+    let said = scratch.run(&format!("{fit} {rates}")).succeeds_quietly().stdout;
+    let said = String::from_utf8(said).unwrap();
+    let (_, kept) = said.split_once("not shown by the points, and kept:\n").unwrap();
+    assert!(kept.contains("termination (m3/(mol s))                  1.3100\n"), "{said}");
+    // Two chambers, two resins, or none.
+    let refused = |command: &str, words: &[&str]| {
+        scratch.run(command).is_wrong_usage(words);
+    };
+    refused("lamp calibrate kinetics films.csv --projector jariwala", &["--material"]);
+    refused(&format!("{fit} --rates oxygen,oxygen"), &["oxygen is given twice"]);
+    let fails = |command: &str, words: &[&str]| {
+        scratch.run(command).is_refused_with(words);
+    };
+    fails(
+        "lamp calibrate kinetics films.csv --material sl-5510 --projector jariwala",
+        &["sl-5510 lacks the rates"],
+    );
+    fails(&fit.replace("jariwala", "zhao"), &["zhao", "cone"]);
+    scratch.write("high.csv", b"exposure_ms,height_um\n5000,210\n");
+    fails(&fit.replace("films", "high"), &["high.csv", "line 2, column height_um: 210 is not"]);
+    scratch.write("few.csv", b"exposure_ms,height_um\n5000,70\n6000,75\n");
+    fails(&fit.replace("films", "few"), &["few.csv", "2 points are too few"]);
+}
+
+#[test]
+fn lines_of_mirrors_are_lit_for_their_times() {
+    let scratch = Scratch::new();
+    let lines = "lamp target lines --projector jariwala --widths 4,9 --times 2s,5s --length 75um --gap 50um";
+    scratch.run(&format!("{lines} -o lines")).succeeds();
+    let layers = scratch.layers("lines/lines.tif");
+    let times: Vec<_> =
+        layers.iter().map(|layer| layer.info.exposure_ms.unwrap().round()).collect();
+    assert_eq!(times, [2000.0, 3000.0]);
+    let pitch = layers[0].pitch.unwrap().dpi()[0];
+    assert!((25_400.0 / pitch - 560.0 / 90.0).abs() < 1e-5, "{pitch}");
+    let masks = masks(&layers);
+    assert_eq!((masks[0].width(), masks[0].height()), (64, 48));
+    assert_eq!(masks[0].row(10)[..4], [8, 12, 20, 29]);
+    assert_eq!(masks.iter().map(|mask| mask.white_pixels()).collect::<Vec<_>>(), [312, 156]);
+    let table = String::from_utf8(scratch.bytes("lines/lines.csv")).unwrap();
+    let rows = "exposure_ms,line_px,x_um,height_um,width_um\n2000,4,0,,\n2000,9,0,,\n5000,4,0,,\n5000,9,0,,\n";
+    assert!(table.ends_with(rows), "{table}");
+    // Its table is read as it is.
+    let fit = "lamp calibrate kinetics lines/lines.csv --material tmpta --projector jariwala";
+    scratch.run(fit).is_refused_with(&["lines.csv"]);
+    let shown = "lamp plan simulate lines/lines.tif --model column --projector jariwala --material pegda-mw700";
+    scratch.run(shown).succeeds();
+    scratch.run("lamp target lines --projector jariwala -o whole").succeeds();
+    for (options, words) in [
+        ("--times 5s,2s", &["--times", "go up"][..]),
+        ("--times 1ms", &["--times", "100 ms"]),
+        ("--length 9mm", &["1024 x 768", "--length"]),
+        ("--widths 9,9", &["9 is given twice"]),
+        ("--widths 0", &["lines of 0 pixels"]),
+        ("--gap 1um", &["gaps of 0 pixels"]),
+    ] {
+        let command = format!("lamp target lines --projector jariwala {options} -o refused");
+        scratch.run(&command).is_wrong_usage(words);
+    }
+    assert!(!scratch.path("refused").exists());
 }

@@ -62,6 +62,7 @@ pub use measurements::{
     DataError, DepthPoint, LampPoint, LawPoint, LawTable, LinePoint, Measured, ProfilePoint,
     WidthPoint, depth_points, lamp_points, law_points, line_points, profile_points, width_points,
 };
+pub use student_t::t_95;
 
 /// The cure models that can be fitted to depths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

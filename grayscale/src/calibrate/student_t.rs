@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_2_PI;
 ///
 /// # Panics
 /// Panics if `freedom` is zero.
-pub(super) fn t_95(freedom: usize) -> f64 {
+pub fn t_95(freedom: usize) -> f64 {
     assert!(freedom > 0, "an interval needs a degree of freedom");
     // 12.7 for one degree, 1.96 for infinitely many.
     let [mut low, mut high] = [1.9, 13.0];

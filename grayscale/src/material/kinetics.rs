@@ -4,6 +4,7 @@ use lamp_stack::Length;
 use serde::{Deserialize, Serialize};
 
 use super::file::MaterialError;
+use super::measured::MeasuredRange;
 use super::number::{Given, GivenNumber};
 use super::{Material, of};
 use crate::resin::{Absorptivity, Concentration, Diffusivity, Kinetics, RateConstant};
@@ -32,6 +33,8 @@ pub struct KineticNumbers {
     pub photoinitiator: Given<Concentration>,
     /// The conversion where resin is solid.
     pub critical_conversion: GivenNumber,
+    /// Where the rates were measured.
+    pub measured: Option<MeasuredRange>,
 }
 
 impl Material {

@@ -91,6 +91,7 @@ impl Material {
             ("gray", lines(&self.gray)),
             ("gray-light", lines(&self.gray_light)),
             ("two-depth", self.two_depth.as_ref().and_then(|it| it.measured.clone())),
+            ("kinetics", self.kinetics.as_ref().and_then(|it| it.measured.clone())),
         ];
         let lights = self.dimmed_lamp.as_ref().and_then(|lines| lines.lights);
         let checked = lights.map_or(Ok(()), |lights| lights.check("lights"));

@@ -24,6 +24,17 @@ impl Profile {
         }
     }
 
+    /// Returns the profile that is a share of the way to another one.
+    pub(super) fn toward(&self, other: &Self, share: f64) -> Self {
+        let between = |from: f64, to: f64| from + share * (to - from);
+        let heights = self.heights_um.iter().zip(&other.heights_um);
+        Self {
+            cells: self.cells,
+            heights_um: heights.map(|(&from, &to)| between(from, to)).collect(),
+            base_um: between(self.base_um, other.base_um),
+        }
+    }
+
     /// Returns the height at the axis, in micrometers.
     pub fn sag_um(&self) -> f64 {
         self.heights_um.first().copied().unwrap_or(0.0)

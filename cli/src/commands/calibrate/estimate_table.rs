@@ -13,6 +13,8 @@ use crate::streams::print;
 pub(super) struct EstimateTable {
     text: String,
     answer: CalibrateAnswer,
+    /// The characters of the column of names.
+    names: usize,
 }
 
 /// The numbers that a calibration fitted, by `lamp calibrate ... --report FILE`.
@@ -21,7 +23,8 @@ pub(super) struct EstimateTable {
 struct CalibrateAnswer {
     /// Name of the measurements, as given.
     input: String,
-    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp`, `scan`, `spread` or `composition`.
+    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp`, `scan`, `spread`, `kinetics` or
+    /// `composition`.
     model: &'static str,
     /// Rows that were used.
     points: usize,
@@ -30,8 +33,8 @@ struct CalibrateAnswer {
     without_measure: usize,
     /// Rows without a measurement.
     blank: usize,
-    /// Share of the scatter that the model explains, of all points; null with models of single sizes
-    /// and profiles, and with laws, whose parameters have it for depths and widths.
+    /// Share of the scatter that the model explains, of all points; null with models of single sizes,
+    /// profiles and kinetics, and with laws, whose parameters have it for depths and widths.
     r2: Option<f64>,
     /// The parameters of the model.
     parameters: Vec<Parameter>,
@@ -101,13 +104,18 @@ impl EstimateTable {
             parameters: Vec::new(),
             groups: Vec::new(),
         };
-        Self { text, answer }
+        Self { text, answer, names: 26 }
+    }
+
+    /// Makes room for longer names.
+    pub(super) fn widen(&mut self, names: usize) {
+        self.names = names;
     }
 
     /// Adds a line of texts, the first to the left and the others to the right of
     /// their columns.
     pub(super) fn line(&mut self, first: &str, others: &[&str]) {
-        let mut line = format!("{first:<26}");
+        let mut line = format!("{first:<0$}", self.names);
         for other in others {
             line += &format!("{other:>12}");
         }

@@ -3,6 +3,7 @@
 mod composition;
 mod depth;
 mod estimate_table;
+mod kinetics;
 mod lamp;
 mod scan;
 mod spread;
@@ -50,6 +51,7 @@ enum Calibration {
     Lamp(lamp::LampArgs),
     Scan(scan::ScanArgs),
     Spread(spread::SpreadArgs),
+    Kinetics(kinetics::KineticsArgs),
     Composition(composition::CompositionArgs),
 }
 
@@ -60,6 +62,7 @@ pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
         Calibration::Lamp(args) => lamp::run(args, common),
         Calibration::Scan(args) => scan::run(args, common),
         Calibration::Spread(args) => spread::run(args, common),
+        Calibration::Kinetics(args) => kinetics::run(args, common),
         Calibration::Composition(args) => composition::run(args, common),
     }
 }

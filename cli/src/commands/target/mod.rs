@@ -1,6 +1,7 @@
 //! `lamp target`: the kinds of test images.
 
 mod grays;
+mod lines;
 mod scan;
 mod screens;
 mod squares;
@@ -12,7 +13,7 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{ExposureTime, Intensity};
 use lamp_grayscale::target::{TargetError, TargetExposure};
 use lamp_pipeline::documents::document;
-use lamp_stack::{Dpi, GrayMask, Layer, Length, PageInfo, StackInfo};
+use lamp_stack::{Dpi, GrayMask, Layer, Length, PageInfo, Pitch, StackInfo};
 
 use crate::args::options::{Common, Output, parse_distance};
 use crate::exit::Exit;
@@ -26,7 +27,8 @@ Examples:
   lamp target squares --doses 60..600mJ/cm2 --material lamp-suspension -o targets/
   lamp target scan --doses 150,300mJ/cm2 --material lamp-suspension -o lines/
   lamp target screens -o screens.tif
-  lamp target grays -o grays.tif")]
+  lamp target grays -o grays.tif
+  lamp target lines --projector jariwala -o lines/")]
 pub(crate) struct TargetArgs {
     #[command(subcommand)]
     what: Target,
@@ -38,6 +40,7 @@ enum Target {
     Scan(scan::ScanArgs),
     Screens(screens::ScreensArgs),
     Grays(grays::GraysArgs),
+    Lines(lines::LinesArgs),
 }
 
 pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
@@ -46,17 +49,18 @@ pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
         Target::Scan(args) => scan::run(args, common),
         Target::Screens(args) => screens::run(args, common),
         Target::Grays(args) => grays::run(args, common),
+        Target::Lines(args) => lines::run(args, common),
     }
 }
 
-/// Returns the pages of a target's stack, one for each dose, at a light and a resolution. The pages of
+/// Returns the pages of a target's stack, one for each dose, at a light and a pitch. The pages of
 /// squares have the side of these.
 fn pages(
     part: String,
     command: String,
     doses: &Doses,
     exposures: Vec<TargetExposure>,
-    (light, dpi): (Intensity, Dpi),
+    (light, pitch): (Intensity, Pitch),
     feature_px: Option<u32>,
 ) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
     let layers = Some(exposures.len() as u32);
@@ -75,7 +79,7 @@ fn pages(
             info.other.insert("feature_px".to_owned(), feature.into());
         }
         info.other.insert("dose_mj_per_cm2".to_owned(), dose.into());
-        Ok(Layer { info, pitch: Some(dpi.into()), image: exposure.image.into() })
+        Ok(Layer { info, pitch: Some(pitch), image: exposure.image.into() })
     })
 }
 

@@ -90,7 +90,7 @@ pub(super) fn run(args: &ScanArgs, common: &Common) -> Result<(), Exit> {
     let path = to.path().join("lines.tif");
     let part = "lines along and across the scan".to_owned();
     let command = args.command(&widths, light);
-    let layers = pages(part, command, &args.doses, exposures, (light, args.dpi), None);
+    let layers = pages(part, command, &args.doses, exposures, (light, args.dpi.into()), None);
     write_stack(layers, Destination::File(path), Format::Big)?;
     write_file(&to.path().join("lines.csv"), |out| out.write_all(table.as_bytes()))?;
     let progress = Progress::new("target", common, true);

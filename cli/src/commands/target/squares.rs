@@ -82,7 +82,8 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
         }
         let path = to.path().join(format!("squares_{size:05}px.tif"));
         let (part, command) = (format!("squares of {size} pixels"), args.command(size, light));
-        let layers = pages(part, command, &args.doses, exposures, (light, args.dpi), Some(size));
+        let layers =
+            pages(part, command, &args.doses, exposures, (light, args.dpi.into()), Some(size));
         write_stack(layers, Destination::File(path), Format::Big)?;
     }
     write_file(&to.path().join("squares.csv"), |out| out.write_all(table.as_bytes()))?;
