@@ -7,8 +7,12 @@ use lamp_fixtures::{Sample, cavity_staircase};
 use lamp_tests::{Scratch, workspace_root};
 
 /// Commands whose measurements another test makes.
-const ELSEWHERE: [&str; 3] =
-    ["lamp calibrate kinetics", "lamp calibrate scan", "lamp calibrate spread"];
+const ELSEWHERE: [&str; 4] = [
+    "lamp calibrate gamma",
+    "lamp calibrate kinetics",
+    "lamp calibrate scan",
+    "lamp calibrate spread",
+];
 
 /// Returns the columns that the book gives, and the axes of each command.
 fn in_the_book() -> (String, BTreeSet<[String; 3]>) {

@@ -265,6 +265,37 @@ fn a_compensated_block_prints_at_its_size_in_both_directions() {
     scratch.run(mixed).is_wrong_usage(&["give both alike"]);
 }
 
+/// Films of four gray levels, simulated, give gamma and the working curve back.
+#[test]
+fn films_of_gray_levels_give_gamma_back() {
+    let scratch = Scratch::new();
+    let mut noise = SplitMix(11);
+    let mut table = "gray,dose_mj_per_cm2,depth_um\n0.25,100,0\n".to_owned();
+    for gray in [1.0, 0.75, 0.5, 0.25] {
+        for dose in [400.0, 800.0, 1600.0] {
+            let depth = 125.0 * (dose * f64::powf(gray, 1.8) / 20.0).ln() + 5.0 * noise.normal();
+            writeln!(table, "{gray},{dose},{depth:.1}").unwrap();
+        }
+    }
+    scratch.write("films.csv", table.as_bytes());
+    let fit = "lamp calibrate gamma films.csv -o mine.toml --plot fit.csv --report fit.json";
+    scratch.run(fit).succeeds();
+    is_as_in_the_book(&scratch, "lamp calibrate gamma", "fit.csv");
+    let answer: Value = serde_json::from_slice(&scratch.bytes("fit.json")).unwrap();
+    for (at, (name, truth)) in [("gamma", 1.8), ("Ec", 20.0), ("Dp", 125.0)].iter().enumerate() {
+        let number = &answer["parameters"][at];
+        assert_eq!(number["name"], *name);
+        let [low, high] = ["low", "high"].map(|end| number[end].as_f64().unwrap());
+        assert!(low < *truth && *truth < high && high - low < truth / 2.0, "{number}");
+    }
+    let toml = String::from_utf8(scratch.bytes("mine.toml")).unwrap();
+    assert!(toml.contains("[gamma]") && toml.contains("[working-curve"), "{toml}");
+    scratch.run("lamp material check mine.toml").succeeds();
+    scratch.write("white.csv", b"dose_mj_per_cm2,depth_um\n400,370\n800,460\n1600,550\n3200,640\n");
+    let white = scratch.run("lamp calibrate gamma white.csv");
+    white.is_refused_with(&["white.csv", "1 gray level is too few: 3"]);
+}
+
 /// Squares of four gray levels, simulated and measured from the side, give the light back, and a material that
 /// planners take.
 #[test]

@@ -9,7 +9,7 @@ use super::least_squares;
 use super::matrix::inverse;
 use super::measurements::ProfilePoint;
 use super::student_t::t_95;
-use super::{Estimate, FitError};
+use super::{Estimate, FitError, given_number};
 use crate::material::{CurveNumbers, GivenNumber, SpreadNumbers};
 use crate::resin::{Dose, GrayLevel, Spread};
 
@@ -152,12 +152,7 @@ impl ProfileFit {
 
     /// Returns the exponent of light over the gray level for a material file, if it is known.
     pub fn gamma_number(&self, source: &str) -> Option<GivenNumber> {
-        let [value, low, high] = self.gamma?;
-        Some(GivenNumber {
-            value: round_significant(value, 6),
-            plus_minus: Some(round_significant((high - value).max(value - low), 3)),
-            source: source.to_owned(),
-        })
+        Some(given_number(self.gamma?, source))
     }
 
     /// Returns the working curve for a material file, if the critical dose is known.

@@ -21,6 +21,7 @@ mod curve_lines;
 mod exposure_times;
 mod extent;
 mod fit_curve;
+mod fit_gamma;
 mod fit_gray;
 mod fit_lamp;
 mod fit_law;
@@ -44,13 +45,14 @@ use std::fmt;
 use lamp_stack::{Length, format_significant, round_significant};
 use thiserror::Error;
 
-use crate::material::{Given, LawVariable};
+use crate::material::{Given, GivenNumber, LawVariable};
 use crate::resin::Quantity;
 
 pub use columns::NumberRow;
 pub use csv_table::{CsvTable, TableError};
 pub use exposure_times::ExposureTimes;
 pub use fit_curve::{CurveFit, fit_curve};
+pub use fit_gamma::{GammaFit, fit_gamma};
 pub use fit_gray::{GrayFit, LevelFit, LineEstimate, fit_gray};
 pub use fit_lamp::{LampFit, fit_lamp};
 pub use fit_law::{LawCurve, LawFit, LawLine, fit_law, law_numbers};
@@ -118,6 +120,16 @@ impl<T: Quantity> Estimate<T> {
             plus_minus: plus_minus.is_finite().then(|| T::of(round_significant(plus_minus, 3))),
             source: source.to_owned(),
         }
+    }
+}
+
+/// Returns a number without a unit and the ends of its interval, for a material file, as
+/// [`Estimate::given`] does.
+fn given_number([value, low, high]: [f64; 3], source: &str) -> GivenNumber {
+    GivenNumber {
+        value: round_significant(value, 6),
+        plus_minus: Some(round_significant((high - value).max(value - low), 3)),
+        source: source.to_owned(),
     }
 }
 

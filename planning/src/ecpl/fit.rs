@@ -114,7 +114,7 @@ pub struct CuredStrip {
     pub pixels: Option<u32>,
     /// The light of a wide white field.
     pub light: Intensity,
-    /// How long it was exposed.
+    /// Its exposure time.
     pub time: ExposureTime,
     /// The half of its section.
     pub profile: Profile,
@@ -132,7 +132,7 @@ pub struct KineticFit {
     pub misfit: Length,
     /// The number of points.
     pub points: usize,
-    /// What the rates cure, sample by sample.
+    /// The parts that the rates cure, sample by sample.
     pub cured: Vec<CuredStrip>,
     measured: MeasuredRange,
 }
@@ -269,7 +269,7 @@ pub fn fit_kinetics(
 }
 
 impl KineticFit {
-    /// Returns the rates for a material file: those of a material, with the fitted ones in their place.
+    /// Returns a material's rates for its file, with the fitted ones in their place.
     pub fn numbers(&self, base: &KineticNumbers) -> KineticNumbers {
         let mut numbers = base.clone();
         for FittedRate { rate, number, .. } in &self.rates {
@@ -325,14 +325,14 @@ struct Sum {
 }
 
 impl Sum {
-    /// Returns the standard deviation of each rate where those of points are 1; infinite or no number where
-    /// the points show nothing of it.
+    /// Returns the standard deviation of each rate where points have a standard deviation of 1; beyond 1e9
+    /// where the points show nothing of it.
     fn deviations(&self) -> Vec<f64> {
         let size = self.slopes.len();
         let deviation = |k: usize| {
             let unit = (0..size).map(|at| f64::from(u8::from(at == k))).collect();
             let sd = solve_positive(&mut self.curvature.clone(), unit)[k].sqrt();
-            // Without any slope there is none; with a singular matrix, the rate of least slope is widest.
+            // Where the matrix is singular, the rate of least slope is widest.
             let alone = 1.0 / self.curvature[k * size + k].sqrt();
             if sd.is_finite() { sd } else { 1e9 + alone.min(1e9) }
         };
@@ -513,7 +513,7 @@ mod tests {
         other
     }
 
-    /// What a resin cures: films, and sections and widths of lines, without errors.
+    /// The cured parts of a resin: films, and sections and widths of lines, without errors.
     fn points(
         setting: &KineticSetting,
         lines: &[Option<u32>],

@@ -13,13 +13,13 @@ pub struct KineticPoint {
     pub pixels: Option<u32>,
     /// The light of a wide white field.
     pub light: Intensity,
-    /// How long it was exposed.
+    /// Its exposure time.
     pub time: ExposureTime,
     /// The measurement.
     pub size: KineticSize,
 }
 
-/// What is measured of a film or a line.
+/// A measured size of a film or a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum KineticSize {
     /// Its height above the glass.
@@ -52,7 +52,7 @@ const WIDEST_UM: f64 = 1e6;
 
 /// Reads heights and widths of films and lines from a table of `exposure_ms`; `line_px`, the mirrors across
 /// a line, empty for a film under a wide field; `height_um`, at `x_um` from the middle of the line, and
-/// `width_um` on the glass, of which one may be empty; and `light_mw_per_cm2`, the light of a wide white
+/// `width_um` on the glass, one of the two or both; and `light_mw_per_cm2`, the light of a wide white
 /// field, the setting's where that is missing. Heights and widths of zero and below cured nothing.
 ///
 /// # Errors

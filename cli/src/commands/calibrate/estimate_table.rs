@@ -23,7 +23,7 @@ pub(super) struct EstimateTable {
 struct CalibrateAnswer {
     /// Name of the measurements, as given.
     input: String,
-    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp`, `scan`, `spread`, `kinetics` or
+    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp`, `scan`, `spread`, `gamma`, `kinetics` or
     /// `composition`.
     model: &'static str,
     /// Rows that were used.

@@ -22,9 +22,9 @@ use crate::exit::Exit;
 /// Fit the rates of a reaction that oxygen inhibits to heights of films and lines
 ///
 /// Expose films and lines of mirrors through the glass of a chamber for several times, and measure
-/// what cured. The CSV file has a header with the columns exposure_ms, line_px (the mirrors across
-/// the line; empty for a film under a wide field), height_um with x_um (the place, from the middle
-/// of the line), width_um (on the glass), and light_mw_per_cm2 where light differs from the
+/// the cured parts. The CSV file has a header with the columns exposure_ms, line_px (the mirrors
+/// across the line; empty for a film under a wide field), height_um with x_um (the place, from the
+/// middle of the line), width_um (on the glass), and light_mw_per_cm2 where light differs from the
 /// projector's. Rates that the points do not show keep the material's values, and are named. lamp
 /// target lines writes the lines.
 #[derive(Args)]

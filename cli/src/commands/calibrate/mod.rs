@@ -3,6 +3,7 @@
 mod composition;
 mod depth;
 mod estimate_table;
+mod gamma;
 mod kinetics;
 mod lamp;
 mod scan;
@@ -51,6 +52,7 @@ enum Calibration {
     Lamp(lamp::LampArgs),
     Scan(scan::ScanArgs),
     Spread(spread::SpreadArgs),
+    Gamma(gamma::GammaArgs),
     Kinetics(kinetics::KineticsArgs),
     Composition(composition::CompositionArgs),
 }
@@ -62,6 +64,7 @@ pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
         Calibration::Lamp(args) => lamp::run(args, common),
         Calibration::Scan(args) => scan::run(args, common),
         Calibration::Spread(args) => spread::run(args, common),
+        Calibration::Gamma(args) => gamma::run(args, common),
         Calibration::Kinetics(args) => kinetics::run(args, common),
         Calibration::Composition(args) => composition::run(args, common),
     }
