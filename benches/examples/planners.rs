@@ -122,8 +122,12 @@ impl Problem {
             at: SampleHeight::Top,
         };
         let whole = Window { settled: self.size[2], ahead: 0 };
-        let options =
-            Options { margin: 0.0, around: Some(0), window: Some(whole), ..Options::default() };
+        let options = Options {
+            margin: Some(0.0),
+            around: Some(0),
+            window: Some(whole),
+            ..Options::default()
+        };
         let mut planned = plan(self.layers(wanted), &light, &options, |_| {})?;
         planned.by_ref().try_for_each(|layer| layer.map(drop))?;
         Ok(planned.outcome())
