@@ -200,7 +200,7 @@ def test_rings_cure_the_profile_that_a_plan_states(glass, sharp):
     ("command", "target", "words"),
     [
         ("column-cure", "map.png", "--pixel 20um --full 150um --bitmaps 5 --optimize height --robust 2um"),
-        ("column-cure", "map.png", "--pixel 20um --full 150um --gray --rays 9x15 --voxel 8um --search-gap 1%"),
+        ("column-cure", "map.png", "--pixel 20um --full 150um --gray --rays 9x15 --voxel 8um --search-gap 1% --dose-error 2%"),
         ("ecpl", "lens.toml", ""),
         ("ecpl", "lens.toml", "--method seed"),
     ],
@@ -277,5 +277,5 @@ def test_doubts_about_a_plan_are_warnings(glass):
     with pytest.warns(lamp.LampWarning, match="lower than 180um") as found:
         lamp.plan_column_cure("hemisphere", **ZHAO)
     assert found[0].filename == __file__
-    with pytest.warns(lamp.LampNote, match="mirrors need more than --max-time 0.0[0-9]+s"):
+    with pytest.warns(lamp.LampNote, match="mirrors are on for all of --max-time 0.0[0-9]+s"):
         column_cure(glass, max_time="50ms", bitmaps=1)

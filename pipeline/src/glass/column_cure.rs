@@ -492,7 +492,8 @@ impl ColumnCure {
                 best.steps, options.stop.gap
             )
         });
-        let at_max = best.at_most(options.max_s);
+        // Times within the usual limit are no doubt: it keeps scattered mirrors short.
+        let at_max = self.inputs.settings.max_time.map_or(0, |_| best.at_most(options.max_s));
         let held = (at_max > 0).then(|| {
             format!("{at_max} mirrors are on for all of --max-time {:.3}s", options.max_s)
         });
