@@ -158,8 +158,9 @@ def test_bitmaps_give_the_doses_and_heights_that_a_plan_states(glass, gray):
     wanted = np.where(plan.target_um > 0, CRITICAL * np.exp(plan.target_um / DEPTH_UM), 0)
     error = 0.5 * np.sum((doses - wanted) ** 2)
     assert error == pytest.approx(plan.bitmaps.error, rel=1e-6)
-    assert error >= plan.best.error - plan.best.gap
-    assert error == pytest.approx(plan.best.error * (1 + plan.bitmaps.excess), rel=1e-6)
+    # The best times are even, so bitmaps may have a smaller error.
+    assert error >= plan.best.error - plan.best.price
+    assert max(error, plan.best.error) == pytest.approx(plan.best.error * (1 + plan.bitmaps.excess), rel=1e-6)
     cured = DEPTH_UM * np.log(np.maximum(doses / CRITICAL, 1))
     assert np.allclose(cured, plan.cured_um, atol=1e-3)
     off = (cured - plan.target_um)[plan.target_um > 0]
