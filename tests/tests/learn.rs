@@ -193,7 +193,10 @@ fn what_teaches_nothing_is_refused_and_changes_nothing() {
             "job/ --measured good.csv --print 3 -o next.csv",
             "print 3 was never planned, and so not printed",
         ),
-        ("none/ --measured good.csv -o next.csv", "there is no job: begin it with --start"),
+        (
+            "none/ --measured good.csv -o next.csv",
+            "there is no job: begin it with lamp learn JOB --start",
+        ),
         ("job/ --start timed.tif --material pegda-sudan", "is the job of timed.tif already"),
         (
             "new/ --start stairs.tif --material pegda-sudan",

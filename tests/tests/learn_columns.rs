@@ -116,7 +116,10 @@ fn a_job_of_columns_is_repeatable_and_guarded() {
             "lamp learn new/ --start plan --material sl-5510 --projector zhao --wanted 9",
             "for stacks",
         ),
-        ("lamp learn new/ --start job --material sl-5510 --projector zhao", "job is another input"),
+        (
+            "lamp learn new/ --start job --material sl-5510 --projector zhao",
+            "job has no bitmaps.tif",
+        ),
         ("lamp learn job/ --measured heights.csv --law single -o three", "--law"),
         ("lamp learn job/ --measured heights.csv -o job/three", "in the job's folder"),
         ("lamp learn job/ --measured heights.csv --pixel 1um --full 1um -o three", "a PNG"),
@@ -133,6 +136,10 @@ fn a_job_of_columns_is_repeatable_and_guarded() {
     scratch.write("far.csv", b"x_mm,y_mm,z_mm,measured_mm\n90,0,0,0\n");
     let far = "lamp learn job/ --measured far.csv -o three";
     scratch.run(far).is_refused_with(&["far.csv", "line 2", "outside"]);
+    // Micrometers where millimeters are meant.
+    scratch.write("um.csv", b"x_mm,y_mm,z_mm,measured_mm\n0,0,0.05,47\n");
+    let um = "lamp learn job/ --measured um.csv -o three";
+    scratch.run(um).is_refused_with(&["um.csv", "line 2", "47 mm is too high"]);
     let record = String::from_utf8(scratch.bytes("job/print-001.toml")).unwrap();
     scratch.write("job/print-001.toml", record.replace("value = 1", "value = 2").as_bytes());
     scratch.run(&format!("{learn} four")).is_refused_with(&["bring it back"]);

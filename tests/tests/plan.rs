@@ -261,7 +261,10 @@ fn strict_tells_of_what_white_light_cannot_cure() {
 fn a_plan_that_cures_nothing_is_a_finding() {
     let scratch = with_stairs();
     for (line, why) in [
-        (format!("{STAIRS} --expose 1ms"), "the plan cures no wanted voxel: expose longer"),
+        (
+            format!("{STAIRS} --expose 1ms"),
+            "the plan cures no wanted voxel, and neither does white light: expose longer",
+        ),
         (
             "lamp plan speed stairs.tif --material pegda-sudan --speed 1m/s..2m/s".to_owned(),
             "the plan cures no voxel of the part",

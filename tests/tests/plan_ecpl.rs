@@ -274,7 +274,7 @@ fn lines_of_mirrors_are_lit_for_their_times() {
     scratch.run(shown).succeeds();
     scratch.run("lamp target lines --projector jariwala -o whole").succeeds();
     for (options, words) in [
-        ("--times 5s,2s", &["--times", "go up"][..]),
+        ("--times 5s,2s", &["--times", "ascending order"][..]),
         ("--times 1ms", &["--times", "100 ms"]),
         ("--length 9mm", &["1024 x 768", "--length"]),
         ("--widths 9,9", &["9 is given twice"]),

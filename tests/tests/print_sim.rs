@@ -201,7 +201,10 @@ fn what_cannot_be_printed_is_refused_and_writes_nothing() {
     let before = scratch.names();
     for (options, words) in [
         ("--truth unknown.toml", "unknown.toml: line 2: unknown key `blur`"),
-        ("--truth unsigned.toml", "line 1: `10%` is not a change: write +25% or -15%"),
+        (
+            "--truth unsigned.toml",
+            "line 1: `10%` is not a change above -100% and up to +1000%: write +25% or -15%",
+        ),
         ("--truth impossible.toml", "the critical dose must be above zero"),
         ("--truth other.toml", "pegda-sodium: there is no such file, nor a material"),
         ("--truth none.toml", "none.toml"),

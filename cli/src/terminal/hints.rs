@@ -388,7 +388,11 @@ fn timed_part(error: &PartError) -> Option<String> {
 
 fn job(error: &JobError) -> Option<String> {
     match error {
-        JobError::NoJob(_) => Some("begin it with --start STACK --material M".to_owned()),
+        JobError::NoJob(_) => Some(
+            "begin it with lamp learn JOB --start STACK --material M, or with the folder of a plan on a \
+             glass and its --projector"
+                .to_owned(),
+        ),
         JobError::Part(error) => timed_part(error),
         JobError::File { problem, .. } => match problem {
             JobFileError::Io(error) => input_output(error),

@@ -23,7 +23,7 @@ pub enum MaterialError {
     #[error("intensity.value must be above zero")]
     Dark,
     /// No display has this exponent of the light over the gray level.
-    #[error("gamma.value must be above zero and at most 20")]
+    #[error("gamma.value must be from 0.05 to 20")]
     Gamma,
     /// Cure widths of one direction only.
     #[error("cure-width has one direction: give `across` and `along`, or none")]
@@ -371,7 +371,7 @@ source = "notebook, page 3"
         );
         for gamma in ["0", "-1", "nan", "inf"] {
             let said = refused(&format!("[gamma]\nvalue = {gamma}\nsource = \"a\"\n"));
-            assert_eq!(said, "gamma.value must be above zero and at most 20");
+            assert_eq!(said, "gamma.value must be from 0.05 to 20");
         }
     }
 

@@ -249,11 +249,11 @@ impl Material {
     /// light (001 eq. 10); 1 if none is given.
     ///
     /// # Errors
-    /// Returns an error if it is not above zero, or above 20.
+    /// Returns an error if it is not from 0.05 to 20.
     pub fn gamma(&self) -> Result<f64, MaterialError> {
         let gamma = self.gamma.as_ref().map_or(1.0, |gamma| gamma.value);
         // With an exponent of zero or less, black would be as bright as white, or brighter.
-        if gamma > 0.0 && gamma <= 20.0 { Ok(gamma) } else { Err(MaterialError::Gamma) }
+        if (0.05..=20.0).contains(&gamma) { Ok(gamma) } else { Err(MaterialError::Gamma) }
     }
 
     /// Returns how deep full white cures, in layers; 1 if the material does not say it.

@@ -53,7 +53,7 @@ impl Kinetics {
         plausible::RATE.check("termination", self.termination)?;
         plausible::RATE.check_or_zero("termination-by-oxygen", self.termination_by_oxygen)?;
         plausible::DIFFUSIVITY.check_or_zero("oxygen-diffusion", self.oxygen_diffusion)?;
-        plausible::CONCENTRATION.check_or_zero("oxygen", self.oxygen)?;
+        plausible::OXYGEN.check_or_zero("oxygen", self.oxygen)?;
         plausible::CONCENTRATION.check("photoinitiator", self.photoinitiator)?;
         if self.quantum_efficiency > 1.0 {
             return Err(ModelError::TooLarge("quantum-efficiency", "1"));

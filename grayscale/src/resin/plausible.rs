@@ -79,10 +79,12 @@ plausible! {
     INTENSITY: Intensity = 1e-6 to 1e9 "mW/cm2";
     /// Wavelengths of light that starts a reaction: from where air absorbs to where water does.
     WAVELENGTH: Length = 0.1 to 2 "um";
-    /// Depths over which light fades by e: 000's clear solid has 100 m (its appendix E).
-    DEPTH: Length = 0.01 to 1e9 "um";
+    /// Depths over which light fades by e.
+    DEPTH: Length = 0.01 to 1e5 "um";
+    /// The same in a solid, which may be clear: 000's has 100 m (its appendix E).
+    SOLID_DEPTH: Length = 0.01 to 1e9 "um";
     /// Sides of pixels and mirrors.
-    SIDE: Length = 0.01 to 1e4 "um";
+    SIDE: Length = 0.01 to 1e3 "um";
     /// Sides of measured squares.
     FEATURE: Length = 0.01 to 1e6 "um";
     /// Distances by which a point's light spreads.
@@ -97,10 +99,12 @@ plausible! {
     SENSITIVITY: WidthSensitivity = 1e-9 to 1e6 "um/(mJ/cm2)";
     /// Concentrations: pure water has 55,000 mol/m3.
     CONCENTRATION: Concentration = 1e-9 to 1e5 "mol/m3";
+    /// Oxygen that is dissolved: resins in air have 1 mol/m3, under pure oxygen five times as much.
+    OXYGEN: Concentration = 1e-9 to 100 "mol/m3";
     /// Absorptivities: the strongest dyes have 30,000 m2/mol.
     ABSORPTIVITY: Absorptivity = 1e-6 to 1e5 "m2/mol";
     /// Rate constants: species that react as they meet in a liquid have 10 million m3/(mol s).
     RATE: RateConstant = 1e-12 to 1e8 "m3/(mol s)";
-    /// Diffusivities: oxygen in air has 2e-5 m2/s.
-    DIFFUSIVITY: Diffusivity = 1e-20 to 1e-4 "m2/s";
+    /// Diffusivities in a liquid: oxygen in water has 2e-9 m2/s.
+    DIFFUSIVITY: Diffusivity = 1e-20 to 1e-7 "m2/s";
 }

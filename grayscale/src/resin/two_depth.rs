@@ -38,7 +38,7 @@ impl TwoDepth {
     ) -> Result<Self, ModelError> {
         plausible::DOSE.check("critical-dose", critical_dose)?;
         plausible::DEPTH.check("liquid-depth", liquid_depth)?;
-        plausible::DEPTH.check("solid-depth", solid_depth)?;
+        plausible::SOLID_DEPTH.check("solid-depth", solid_depth)?;
         let begins = depths.from.um() >= 0.0 && depths.from.um().is_finite();
         if !begins || depths.to.is_some_and(|to| !(to > depths.from && to.um().is_finite())) {
             return Err(ModelError::NoDepths);

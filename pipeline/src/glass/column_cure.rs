@@ -497,7 +497,11 @@ impl ColumnCure {
         let held = (at_max > 0).then(|| {
             format!("{at_max} mirrors are on for all of --max-time {:.3}s", options.max_s)
         });
-        late.into_iter().chain(held).collect()
+        let is_cured = |dose: &f64| self.curve.height_um(*dose) > 0.0;
+        let nothing = (!self.plan.doses.iter().any(is_cured)).then(|| {
+            "the plan cures no column: allow a longer --max-time, or take more light".to_owned()
+        });
+        late.into_iter().chain(held).chain(nothing).collect()
     }
 }
 

@@ -135,7 +135,10 @@ impl ColumnCure {
                 match plan.best.price / plan.best.error {
                     // A bound of as much as the error bounds nothing.
                     share if self.options.dose_error > 0.0 && share < 1.0 => {
-                        format!(" with even times, and within {:.2}% with any", 100.0 * share)
+                        format!(
+                            " with even times; uneven times could be at most {:.2}% better",
+                            100.0 * share
+                        )
                     }
                     _ => String::new(),
                 }

@@ -478,6 +478,16 @@ impl<S: GlassSettings> GlassJob<S> {
         let PrintMeasurements::Heights(rows) = measured else {
             return Err(Error::work("a plan on a glass learns from heights, not from layers"));
         };
+        // A height in micrometers where millimeters are meant would make a state that no print has.
+        let highest_mm = rows.iter().map(|row| row.z_mm).fold(0.0, f64::max);
+        let most_mm = 10.0 * highest_mm + 1.0;
+        if let Some(row) = rows.iter().find(|row| row.measured_mm > most_mm) {
+            return Err(Error::work(format!(
+                "line {}: {} mm is too high for a print of {highest_mm} mm: heights are in \
+                 millimeters, at most {most_mm:.3} here",
+                row.line, row.measured_mm
+            )));
+        }
         let earlier = self.prints[..print].iter().filter_map(|print| match &print.measured {
             Some((PrintMeasurements::Heights(rows), _)) => Some((&print.light, &rows[..])),
             _ => None,

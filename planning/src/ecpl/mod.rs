@@ -24,6 +24,6 @@ pub use fit::{CuredStrip, FittedRate, KineticFit, KineticFitError, KineticRate, 
 pub use plan::{Method, RingPlan, RingPlanError, plan};
 pub use profile::{Profile, WantedProfile};
 pub use reactor::{Chamber, Reaction};
-pub use samples::{KineticPoint, KineticSize, kinetic_points};
+pub use samples::{KineticPoint, KineticSize, LONGEST_MS, kinetic_points};
 pub use setting::{KineticSetting, SettingError};
 pub use simulation::RingSimulation;

@@ -45,7 +45,7 @@ const COLUMNS: &[&str; 6] =
     &["exposure_ms", "line_px", "x_um", "height_um", "width_um", "light_mw_per_cm2"];
 
 /// The longest exposure, in milliseconds: a day would take hours to simulate, and cures any resin through.
-const LONGEST_MS: f64 = 600_000.0;
+pub const LONGEST_MS: f64 = 600_000.0;
 
 /// The widest length in um, a meter: a typing error beyond.
 const WIDEST_UM: f64 = 1e6;
@@ -100,7 +100,7 @@ fn sizes(
             Some(if whole {
                 number as u32
             } else {
-                return Err(refused(1, "a number of mirrors from 1 to the display's"));
+                return Err(refused(1, "a whole number of mirrors, from 1 to the display's"));
             })
         }
     };
@@ -108,23 +108,35 @@ fn sizes(
     if !plausible::INTENSITY.contains(&light) {
         return Err(refused(5, "a light that a projector has"));
     }
+    // No light cures further from a line than the chamber is high.
+    let line_um = f64::from(pixels.unwrap_or(0)) * setting.pixel_um;
     let place = match (place, pixels) {
         (None, _) => 0.0,
         (Some(_), None) => return Err(refused(2, "empty for a film, which is alike everywhere")),
-        (Some(um), _) if um.abs() <= WIDEST_UM => um.abs(),
-        _ => return Err(refused(2, "a place up to a meter from the middle")),
+        (Some(um), _) if um.abs() <= line_um / 2.0 + setting.chamber_um => um.abs(),
+        _ => {
+            return Err(refused(
+                2,
+                "within the line, or outside of it by the height of the chamber at most",
+            ));
+        }
     };
     if let Some(um) = height
         && !(-WIDEST_UM..setting.chamber_um).contains(&um)
     {
-        return Err(refused(3, "a height below the chamber's"));
+        return Err(refused(3, "a height in micrometers, below the chamber's"));
     }
     if let Some(um) = width {
         if pixels.is_none() {
             return Err(refused(4, "empty for a film, which has no edge"));
         }
-        if um.abs() > WIDEST_UM {
-            return Err(refused(4, "a width up to a meter"));
+        // A width of less than a micrometer is a slip for millimeters.
+        let possible = 1.0..=line_um + 2.0 * setting.chamber_um;
+        if um > 0.0 && !possible.contains(&um) {
+            return Err(refused(
+                4,
+                "a width from 1 um to the line's and twice the chamber's height",
+            ));
         }
     }
     let above_zero = |um: &f64| *um > 0.0;

@@ -86,7 +86,9 @@ impl FromStr for Change {
             Some(percent) if percent > -100.0 && percent <= 1000.0 => {
                 Ok(Self(1.0 + percent / 100.0))
             }
-            _ => Err(format!("`{text}` is not a change: write +25% or -15%")),
+            _ => Err(format!(
+                "`{text}` is not a change above -100% and up to +1000%: write +25% or -15%"
+            )),
         }
     }
 }
@@ -218,7 +220,10 @@ mod tests {
     fn wrong_keys_and_values_are_named_with_their_lines() {
         let refused = |text: &str| Truth::parse(text).unwrap_err().to_string();
         let share = refused("light = '+1%'\npenetration-depth = '25%'\n");
-        assert_eq!(share, "line 2: `25%` is not a change: write +25% or -15%");
+        assert_eq!(
+            share,
+            "line 2: `25%` is not a change above -100% and up to +1000%: write +25% or -15%"
+        );
         let less = refused("light = '-100%'\n");
         assert!(less.starts_with("line 1: `-100%` is not a change"), "{less}");
         let unit = refused("critical-dose = '7'\n");

@@ -268,7 +268,7 @@ divergence = { value = 1, source = "data sheet" }
             ("1920\nrows = 1080", "32768\nrows = 32768", &["display", "67 million"]),
             ("15.2 um", "15.2", &["line 14", "pitch.value", "unit"]),
             ("15.2 um", "0 um", &["pitch.value must be above zero"]),
-            ("15.2 um", "15.2 mm", &["pitch.value must be 0.01 to 1e4 um: a unit"]),
+            ("15.2 um", "15.2 mm", &["pitch.value must be 0.01 to 1e3 um: a unit"]),
             ("\"7 um\"", "\"-7 um\"", &["mirror.side must be above zero"]),
             ("0.6 um", "-0.6 um", &["mirror.gap must be zero or more"]),
             ("sigma", "sigmas", &["line 18", "spread", "sigmas"]),

@@ -198,7 +198,7 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
         }
         if args.kept.projector.is_some() {
             return Err(Exit::usage(format!(
-                "--projector is for the folder of a plan of bitmaps on a glass: {} is another input",
+                "--projector is for the folder of a plan on a glass, and {} has no bitmaps.tif",
                 input_name(stack)
             )));
         }

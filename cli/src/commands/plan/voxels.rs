@@ -100,7 +100,16 @@ pub(crate) struct VoxelsArgs {
     output: Output,
 }
 
-const NOTHING_CURED: &str = "the plan cures no wanted voxel: expose longer, or keep what white light cures by --objective boundary";
+/// Returns why a plan that cures nothing is of no use.
+fn nothing_cured(outcome: &Outcome) -> Option<&'static str> {
+    let has_targets = outcome.layers.iter().any(|layer| layer.targets > 0);
+    outcome.cures_nothing().then_some(if has_targets {
+        "the plan cures no wanted voxel: expose longer, or keep the voxels that white light cures by \
+         --objective boundary"
+    } else {
+        "the plan cures no wanted voxel, and neither does white light: expose longer"
+    })
+}
 
 /// Returns the pixels of `3px`, which are some.
 fn parse_pixels(text: &str) -> Option<u32> {
@@ -223,8 +232,8 @@ impl VoxelsArgs {
         if let Some((path, bytes)) = map.drawn()? {
             write_file(path, |out| out.write_all(&bytes))?;
         }
-        if planned.outcome.cures_nothing() && !self.strict {
-            progress.warn(&format!("{}: {NOTHING_CURED}", input_name(&self.input.stack)));
+        if let Some(why) = nothing_cured(planned.outcome).filter(|_| !self.strict) {
+            progress.warn(&format!("{}: {why}", input_name(&self.input.stack)));
         }
         written
     }
@@ -318,8 +327,7 @@ impl VoxelsArgs {
     fn finding(&self, outcome: &Outcome) -> Option<Exit> {
         let name = || input_name(&self.input.stack);
         let found = match outcome.uncurable() {
-            0 if outcome.cures_nothing() => Some(format!("{}: {NOTHING_CURED}", name())),
-            0 => doubts(),
+            0 => nothing_cured(outcome).map(|why| format!("{}: {why}", name())).or_else(doubts),
             uncurable => {
                 Some(format!("{}: white light cannot cure {uncurable} wanted voxels", name()))
             }

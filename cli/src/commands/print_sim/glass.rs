@@ -158,7 +158,7 @@ impl<'a, S: GlassSettings> GlassRun<'a, S> {
         let sd = match args.noise {
             Some(Noise::Length(length)) => length,
             Some(Noise::Share(_)) => {
-                return Err(Exit::usage("heights have a length as their --noise, such as 2um"));
+                return Err(Exit::usage("the --noise of heights is a length, such as 2um"));
             }
             None => NOISE,
         };

@@ -214,11 +214,11 @@ impl PrintSimArgs {
     fn check_noise(&self) -> Result<(), Exit> {
         match (self.noise, self.heights) {
             (Some(Noise::Length(_)), None) => Err(Exit::usage(
-                "counts of pixels have a share as their --noise, such as 2%; a length is for \
+                "the --noise of counts of pixels is a share, such as 2%; a length is for \
                      --heights",
             )),
             (Some(Noise::Share(_)), Some(_)) => Err(Exit::usage(
-                "heights have a length as their --noise, such as 2um; a share is for counts of \
+                "the --noise of heights is a length, such as 2um; a share is for counts of \
                      pixels",
             )),
             _ => Ok(()),

@@ -7,6 +7,7 @@ use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_grayscale::target::lines;
 use lamp_pipeline::documents::document;
+use lamp_planning::ecpl::LONGEST_MS;
 use lamp_planning::projector::Projector;
 use lamp_stack::{Destination, Format, Length, Pitch, write_stack};
 
@@ -63,10 +64,11 @@ pub(super) fn run(args: &LinesArgs, common: &Common) -> Result<(), Exit> {
     let projector: Projector = document(&args.projector)?;
     let light = projector.irradiance();
     let widths = sorted("--widths", &args.widths)?;
-    let shown = |time: &&ExposureTime| time.ms() >= projector.step.value.ms() * (1.0 - 1e-9);
+    let step_ms = projector.step.value.ms() * (1.0 - 1e-9);
+    let shown = |time: &&ExposureTime| (step_ms..=LONGEST_MS).contains(&time.ms());
     if !(args.times.iter().all(|time| shown(&time)) && args.times.is_sorted_by(|a, b| a < b)) {
         return Err(Exit::usage(format!(
-            "--times: they must go up, from the display's step, {}",
+            "--times: write times in ascending order, from the display's step of {} to ten minutes",
             projector.step.value
         )));
     }
@@ -121,7 +123,7 @@ exposure_ms,line_px,x_um,height_um,width_um
 impl LinesArgs {
     fn command(&self, widths: &[u32], projector: &str) -> String {
         let widths: Vec<String> = widths.iter().map(u32::to_string).collect();
-        let times: Vec<String> = self.times.iter().map(ExposureTime::to_string).collect();
+        let times: Vec<String> = self.times.iter().map(|time| format!("{}ms", time.ms())).collect();
         let (widths, times) = (widths.join(","), times.join(","));
         let Self { length, gap, .. } = self;
         format!(
