@@ -100,6 +100,14 @@ fn a_flat_field_is_made_up_for() {
 }
 
 #[test]
+fn a_plan_that_cures_nothing_gets_a_warning() {
+    let scratch = Scratch::new();
+    let ran = scratch.run(&format!("{LENSES} --max-time 1ms")).succeeds();
+    assert!(ran.stderr.contains("warning: plan: the plan cures no column"), "{ran:?}");
+    assert!(ran.stderr.contains("mirrors are on for all of --max-time 0.001s"), "{ran:?}");
+}
+
+#[test]
 fn what_cannot_be_planned_is_refused_in_a_sentence() {
     let scratch = Scratch::new();
     let refused = |options: &str, words: &[&str]| {

@@ -300,6 +300,10 @@ impl ColumnCureSettings {
             curve,
             plan,
         };
+        if cure.plan.doses.iter().all(|&dose| curve.height_um(dose) <= 0.0) {
+            let why = "the plan cures no column: allow a longer --max-time, or take more light";
+            watcher.remark(Remark::warning(why.to_owned()));
+        }
         cure.doubts().into_iter().for_each(|doubt| watcher.remark(Remark::note(doubt)));
         Ok(cure)
     }
@@ -497,11 +501,7 @@ impl ColumnCure {
         let held = (at_max > 0).then(|| {
             format!("{at_max} mirrors are on for all of --max-time {:.3}s", options.max_s)
         });
-        let is_cured = |dose: &f64| self.curve.height_um(*dose) > 0.0;
-        let nothing = (!self.plan.doses.iter().any(is_cured)).then(|| {
-            "the plan cures no column: allow a longer --max-time, or take more light".to_owned()
-        });
-        late.into_iter().chain(held).chain(nothing).collect()
+        late.into_iter().chain(held).collect()
     }
 }
 
