@@ -278,5 +278,6 @@ def test_doubts_about_a_plan_are_warnings(glass):
     with pytest.warns(lamp.LampWarning, match="lower than 180um") as found:
         lamp.plan_column_cure("hemisphere", **ZHAO)
     assert found[0].filename == __file__
-    with pytest.warns(lamp.LampNote, match="mirrors are on for all of --max-time 0.0[0-9]+s"):
+    nothing = pytest.warns(lamp.LampWarning, match="the plan cures no column")
+    with pytest.warns(lamp.LampNote, match="mirrors are on for all of --max-time 0.0[0-9]+s"), nothing:
         column_cure(glass, max_time="50ms", bitmaps=1)
