@@ -34,8 +34,8 @@ const FEWEST_LEVELS: usize = 3;
 /// Fits `C_d = D_p ln(E G^γ / E_c)`, with the dose of white `E` and the gray level `G` (001 eq. 10), by
 /// linear regression of the depth on the logarithms of dose and level.
 ///
-/// The interval of `D_p` is the slope's, by Student's t; those of `γ` and `E_c` come from Fieller's theorem,
-/// and are not symmetric.
+/// The interval of `D_p` is the slope's, by Student's t. The intervals of `γ` and `E_c` come from Fieller's
+/// theorem, and are not symmetric.
 ///
 /// # Errors
 /// Returns an error if there are too few points, doses or levels, if the depth does not clearly rise with
@@ -113,8 +113,8 @@ pub fn fit_gamma(points: &[DepthPoint]) -> Result<GammaFit, FitError> {
 }
 
 /// Returns the ratio of two numbers and its interval by Fieller's theorem: every ratio `r` for which the
-/// interval of `p - r q` holds zero. The squared half widths are those of `p`, of both and of `q`, which is
-/// wider than its own.
+/// interval of `p - r q` holds zero. `p2` and `q2` are the squares of half their intervals, and `both` is the
+/// same of their covariance.
 fn ratio([p, q]: [f64; 2], [p2, both, q2]: [f64; 3]) -> [f64; 3] {
     let (square, middle) = (q * q - q2, p * q - both);
     let root = (middle * middle - square * (p * p - p2)).max(0.0).sqrt();

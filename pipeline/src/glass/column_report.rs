@@ -70,7 +70,8 @@ struct BestReport {
     term: f64,
     /// The gap as a share of the sum.
     relative_gap: f64,
-    /// The most by which the error of any allowed times, however uneven, can be smaller.
+    /// The most by which the error of any allowed times, however uneven, can be smaller; for heights, whose
+    /// errors are not convex, an estimate.
     price: f64,
     /// Steps of the search.
     steps: usize,
@@ -133,8 +134,13 @@ impl ColumnCure {
                 100.0 * plan.excess(),
                 plan.best.relative_gap(),
                 match plan.best.price / plan.best.error {
-                    // A bound of as much as the error bounds nothing.
-                    share if self.options.dose_error > 0.0 && share < 1.0 => {
+                    // A bound of as much as the error bounds nothing, and errors of heights are not convex,
+                    // so that there it is none.
+                    share
+                        if self.options.dose_error > 0.0
+                            && share < 1.0
+                            && self.options.objective == ColumnObjective::Dose =>
+                    {
                         format!(
                             " with even times; uneven times could be at most {:.2}% better",
                             100.0 * share

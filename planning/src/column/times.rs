@@ -21,8 +21,8 @@ pub struct Allowed {
     /// The longest time of a mirror, in seconds.
     pub max_s: f64,
     /// The error that half of the sum of the squared times adds, for each s². Where light spreads over
-    /// many mirrors, doses nearly do not depend on which of them are on, and without it the nearest
-    /// times are scattered and long.
+    /// many mirrors, it hardly matters which of them are on, and without it the times with the nearest
+    /// doses are scattered and long.
     pub evenness: f64,
 }
 
@@ -37,7 +37,8 @@ pub struct MirrorTimes {
     pub term: f64,
     /// The most by which the least sum can be smaller: the Frank-Wolfe gap.
     pub gap: f64,
-    /// The most by which the least error of any allowed times, however uneven, can be smaller.
+    /// The most by which the least error of any allowed times, however uneven, can be smaller. Errors of
+    /// heights are not convex, so that there it is an estimate, as the gap is.
     pub price: f64,
     /// The number of steps of the search.
     pub steps: usize,
