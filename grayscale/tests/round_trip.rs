@@ -6,10 +6,8 @@ use lamp_grayscale::material::{
     GivenRange, KineticNumbers, LawEnd, LawNumbers, LawVariable, Material, MeasuredRange,
     SpreadNumbers, TwoDepthNumbers, WidthNumbers,
 };
-use lamp_grayscale::resin::{
-    Absorptivity, Concentration, Diffusivity, Dose, Intensity, Quantity, RateConstant,
-    WidthSensitivity,
-};
+use lamp_grayscale::resin::plausible::{self, Plausible};
+use lamp_grayscale::resin::{Dose, Quantity};
 use lamp_stack::{Catalogued, Length};
 use proptest::option;
 use proptest::prelude::*;
@@ -18,12 +16,18 @@ fn number() -> impl Strategy<Value = f64> + Clone {
     1e-6..1e9f64
 }
 
+/// Quantities of all powers of ten of a range.
+fn of<T: Quantity + std::fmt::Debug>(range: Plausible<T>) -> impl Strategy<Value = T> + Clone {
+    let (from, to) = (*range.ends().start(), *range.ends().end());
+    (from.ln()..to.ln()).prop_map(move |exponent| T::of(exponent.exp().clamp(from, to)))
+}
+
 fn um() -> impl Strategy<Value = Length> + Clone {
-    number().prop_map(Length::from_um)
+    of(plausible::DEPTH)
 }
 
 fn mj() -> impl Strategy<Value = Dose> + Clone {
-    number().prop_map(Dose::from_mj_per_cm2)
+    of(plausible::DOSE)
 }
 
 /// Texts that TOML must escape.
@@ -79,21 +83,20 @@ fn two_depth() -> impl Strategy<Value = TwoDepthNumbers> {
         let to = ends.then_some(Length::from_um(2.0 * from.um()));
         GivenDepths { from, to, source }
     });
-    (given(mj()), given(um()), given(um()), option::of(depths), measured()).prop_map(
-        |(critical_dose, liquid_depth, solid_depth, depths, measured)| TwoDepthNumbers {
+    (given(mj()), given(um()), given(of(plausible::SOLID_DEPTH)), option::of(depths), measured())
+        .prop_map(|(critical_dose, liquid_depth, solid_depth, depths, measured)| TwoDepthNumbers {
             critical_dose,
             liquid_depth,
             solid_depth,
             depths,
             measured,
-        },
-    )
+        })
 }
 
 /// Returns distinct sizes.
 fn widths() -> impl Strategy<Value = Vec<WidthNumbers>> {
-    let slope = number().prop_map(WidthSensitivity::from_um_per_mj_per_cm2);
-    let numbers = (0.1..1.0f64, given(mj()), given(slope), measured());
+    let slope = given(of(plausible::SENSITIVITY));
+    let numbers = (0.1..1.0f64, given(mj()), slope, measured());
     proptest::collection::vec(numbers, 0..3).prop_map(|sizes| {
         let size = |(k, (share, critical_dose, sensitivity, measured))| WidthNumbers {
             feature_size: Length::from_um(f64::from(k) + share),
@@ -107,18 +110,18 @@ fn widths() -> impl Strategy<Value = Vec<WidthNumbers>> {
 }
 
 fn spread() -> impl Strategy<Value = SpreadNumbers> {
+    // The widest that light in a vat may be: `Spread::WIDEST`.
     let sigma = || given((0.001..2000.0_f64).prop_map(Length::from_um));
     let one = sigma().prop_map(|sigma| [Some(sigma), None, None]);
     let two = (sigma(), sigma()).prop_map(|(across, along)| [None, Some(across), Some(along)]);
-    (prop_oneof![one, two], option::of(given(mj())), option::of(given(um()))).prop_map(
-        |([sigma, sigma_across, sigma_along], critical_dose, pixel)| SpreadNumbers {
+    (prop_oneof![one, two], option::of(given(mj())), option::of(given(of(plausible::SIDE))))
+        .prop_map(|([sigma, sigma_across, sigma_along], critical_dose, pixel)| SpreadNumbers {
             sigma,
             sigma_across,
             sigma_along,
             critical_dose,
             pixel,
-        },
-    )
+        })
 }
 
 fn gamma() -> impl Strategy<Value = GivenNumber> {
@@ -130,16 +133,16 @@ fn gamma() -> impl Strategy<Value = GivenNumber> {
 }
 
 fn kinetics() -> impl Strategy<Value = KineticNumbers> {
-    let rate = || given(number().prop_map(RateConstant::from_m3_per_mol_s));
-    let moles = || given(number().prop_map(Concentration::from_mol_per_m3));
+    let rate = || given(of(plausible::RATE));
+    let moles = (given(of(plausible::OXYGEN)), given(of(plausible::CONCENTRATION)));
     let share = || {
         (1e-6..0.99, option::of(number()), text())
             .prop_map(|(value, plus_minus, source)| GivenNumber { value, plus_minus, source })
     };
-    let absorptivity = given(number().prop_map(Absorptivity::from_m2_per_mol));
-    let diffusion = given(number().prop_map(Diffusivity::from_m2_per_s));
-    let light = (given(um()), share(), absorptivity);
-    (light, (rate(), rate(), rate()), diffusion, (moles(), moles()), share(), measured()).prop_map(
+    let absorptivity = given(of(plausible::ABSORPTIVITY));
+    let diffusion = given(of(plausible::DIFFUSIVITY));
+    let light = (given(of(plausible::WAVELENGTH)), share(), absorptivity);
+    (light, (rate(), rate(), rate()), diffusion, moles, share(), measured()).prop_map(
         |(
             light,
             rates,
@@ -173,7 +176,7 @@ fn constant() -> impl Strategy<Value = Constant> {
 }
 
 fn materials() -> impl Strategy<Value = Material> {
-    let intensity = given(number().prop_map(Intensity::from_mw_per_cm2));
+    let intensity = given(of(plausible::INTENSITY));
     let light = (option::of(intensity), option::of(spread()), option::of(gamma()));
     let models =
         (curve(), option::of(lines()), option::of(lines()), option::of(two_depth()), widths());

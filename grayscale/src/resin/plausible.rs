@@ -2,6 +2,7 @@
 //! of ten.
 
 use std::marker::PhantomData;
+use std::ops::RangeInclusive;
 
 use lamp_stack::Length;
 
@@ -35,7 +36,12 @@ pub struct Plausible<T> {
 impl<T: Quantity> Plausible<T> {
     /// Returns whether it holds the value.
     pub fn contains(&self, value: &T) -> bool {
-        (self.from..=self.to).contains(&value.number())
+        self.ends().contains(&value.number())
+    }
+
+    /// Returns its ends, in the unit of the quantity.
+    pub fn ends(&self) -> RangeInclusive<f64> {
+        self.from..=self.to
     }
 
     /// Checks that it holds the value of a name.
