@@ -125,7 +125,7 @@ fn spread() -> impl Strategy<Value = SpreadNumbers> {
 }
 
 fn gamma() -> impl Strategy<Value = GivenNumber> {
-    (number(), option::of(number()), text()).prop_map(|(value, plus_minus, source)| GivenNumber {
+    (0.05..20.0, option::of(number()), text()).prop_map(|(value, plus_minus, source)| GivenNumber {
         value,
         plus_minus,
         source,
