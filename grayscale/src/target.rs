@@ -29,6 +29,11 @@ pub enum TargetError {
     /// There are no gray levels or too many.
     #[error("the gray levels must be 1 to 20")]
     Levels,
+    /// Dots are too large for their cells, or cells for the display.
+    #[error(
+        "dots take a third of the way to the next one at most, and stand in two rows and columns at least"
+    )]
+    Dots,
     /// A length in pixels is zero or too large.
     #[error("{what} of {pixels} pixels: they have 1 to {most}")]
     Pixels {
@@ -335,6 +340,40 @@ pub fn gray_squares(levels: &[GrayLevel], side: u32, gap: u32) -> Result<GrayMas
         image.push_runs(row).expect("squares are within the width");
     }
     Ok(image)
+}
+
+/// Makes square dots all over a display of columns and rows, one in the middle of each cell of `period`
+/// pixels. The dots of the upper left quarter are twice as wide, so that the image looks different however
+/// it is turned or mirrored.
+///
+/// # Errors
+/// Returns an error if a dot is not a third of its cell or less, or if fewer than two cells lie along a
+/// side.
+pub fn dots([columns, rows]: [u32; 2], side: u32, period: u32) -> Result<Mask, TargetError> {
+    check_pixels("dots", side, MAX_TILE)?;
+    check_pixels("displays", columns.max(rows), MAX_ROWS)?;
+    let cells = [columns, rows].map(|pixels| pixels / period.max(1));
+    if period < 3 * side || cells.contains(&0) || cells.contains(&1) {
+        return Err(TargetError::Dots);
+    }
+    let first = |pixels: u32, cells: u32| (pixels - cells * period) / 2 + (period - side) / 2;
+    let (left, top) = (first(columns, cells[0]), first(rows, cells[1]));
+    let mut mask = MaskBuilder::new(columns);
+    mask.push_black(top);
+    for row in 0..cells[1] {
+        let edges = (0..cells[0]).flat_map(|column| {
+            let is_wide = 2 * row < cells[1] && 2 * column < cells[0];
+            let left = left + column * period;
+            [left, left + if is_wide { 2 * side } else { side }]
+        });
+        let edges: Vec<u32> = edges.collect();
+        for _ in 0..side {
+            mask.push_row(&edges).expect("dots lie within their cells");
+        }
+        let is_last = row + 1 == cells[1];
+        mask.push_black(if is_last { rows - top - row * period - side } else { period - side });
+    }
+    Ok(mask.finish())
 }
 
 /// Returns a square's rank among the 64 of its 8 x 8. Ranks below the level's 64ths are

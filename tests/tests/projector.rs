@@ -1,5 +1,10 @@
-//! Checks what `lamp projector` says of projectors, and what it refuses.
+//! Checks what `lamp projector` says of projectors and refuses, and the light that `lamp calibrate
+//! projector` finds in pictures.
 
+use std::fs::File;
+use std::io::BufReader;
+
+use lamp_planning::target::GrayPicture;
 use lamp_tests::Scratch;
 use serde_json::Value;
 
@@ -48,4 +53,126 @@ fn a_lens_out_of_focus_is_refused_with_how_far() {
     assert!(sharp.contains("134.63mm behind its middle, 0.00mm off"), "{sharp}");
     let unknown = scratch.run("lamp projector show nobody");
     unknown.is_refused_with(&["nobody: there is no such file, nor a projector of that name"]);
+}
+
+/// A camera's picture of a display of 96 x 64 mirrors, upright and mirrored: two pixels a mirror, light that
+/// spreads by 0.9 mirrors, and half as much light at the left edge as at the right one.
+fn camera(shown: &GrayPicture) -> GrayPicture {
+    const SIGMA: f64 = 0.9;
+    let (columns, rows) = (240, 160);
+    let erf = |end: f64| libm::erf(end / (SIGMA * 2.0_f64.sqrt()));
+    let tap = |away: f64| (erf(away + 0.5) - erf(away - 0.5)) / 2.0;
+    let lit =
+        |row: usize, column: usize| f64::from(shown.levels[row * shown.columns + column]) / 65535.0;
+    // The light of each row of mirrors along the camera's columns, averaged over a pixel.
+    let along = |count: usize, pixels: usize, mirrored: bool| -> Vec<Vec<f64>> {
+        let of_pixel = |pixel: usize| {
+            let side = if mirrored { -1.0 } else { 1.0 };
+            let at = |part: f64| side * (pixel as f64 + part - pixels as f64 / 2.0) / 2.0;
+            let parts = (0..8).map(|k| at((f64::from(k) + 0.5) / 8.0)).collect::<Vec<_>>();
+            let mirror = |mirror: usize| {
+                let middle = mirror as f64 + 0.5 - count as f64 / 2.0;
+                parts.iter().map(|at| tap(at - middle)).sum::<f64>() / 8.0
+            };
+            (0..count).map(mirror).collect()
+        };
+        (0..pixels).map(of_pixel).collect()
+    };
+    let (across, down) = (along(96, columns, true), along(64, rows, false));
+    let mut levels = Vec::new();
+    for y in 0..rows {
+        let of_row =
+            |column: usize| (0..64).map(|row| down[y][row] * lit(row, column)).sum::<f64>();
+        let sums: Vec<f64> = (0..96).map(of_row).collect();
+        for (x, taps) in across.iter().enumerate() {
+            let light: f64 = taps.iter().zip(&sums).map(|(tap, sum)| tap * sum).sum();
+            let place = -(x as f64 + 0.5 - columns as f64 / 2.0) / 2.0 / 48.0;
+            levels.push((65535.0 * (0.02 + light * (0.45 + 0.15 * place))).round() as u16);
+        }
+    }
+    GrayPicture { columns, rows, levels }
+}
+
+#[test]
+fn a_picture_of_dots_gives_a_projector_its_light() {
+    let scratch = Scratch::new();
+    let small = printed(&scratch, "lamp projector show jariwala")
+        .replace("columns = 1024", "columns = 96")
+        .replace("rows = 768", "rows = 64");
+    scratch.write("small.toml", small.as_bytes());
+    scratch
+        .run("lamp target dots --projector small.toml --dot 4 --period 16 -q -o dots.tif")
+        .succeeds();
+    scratch.run("lamp convert dots.tif --png -q -o dots/").succeeds();
+    let dots = std::fs::read_dir(scratch.path("dots")).unwrap().map(|entry| entry.unwrap().path());
+    let dots = dots.filter(|path| path.extension().is_some_and(|ending| ending == "png"));
+    let dots = dots.map(|path| image::open(path).unwrap().into_luma16()).next().unwrap();
+    let (columns, rows) = (dots.width() as usize, dots.height() as usize);
+    let dots = GrayPicture { columns, rows, levels: dots.into_raw() };
+    scratch.write("camera.png", &camera(&dots).to_png().unwrap());
+    let line = "lamp calibrate projector camera.png --shown dots.tif --projector small.toml";
+    let json = printed(&scratch, &format!("{line} --pixel 3um --json"));
+    let answer: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(
+        (&answer["model"], &answer["schema"]),
+        (&"projector".into(), &"lamp-calibrate-1".into())
+    );
+    let number = |name: &str| {
+        let of = answer["parameters"].as_array().unwrap().iter().find(|it| it["name"] == name);
+        of.unwrap_or_else(|| panic!("{name} of {answer}"))["value"].as_f64().unwrap()
+    };
+    assert!((number("sigma") / (0.9 * 6.0) - 1.0).abs() < 5e-3, "{answer}");
+    assert!((number("pitch") / 6.0 - 1.0).abs() < 1e-4, "{answer}");
+    assert!(
+        number("turned").abs() < 0.01 && (number("dark") - 2.0 / 0.45).abs() < 0.01,
+        "{answer}"
+    );
+    let files = "--name mine -o mine.toml --flat-field light.png";
+    let run = scratch.run(&format!("{line} {files}")).succeeds();
+    let table = String::from_utf8(run.stdout).unwrap();
+    assert!(
+        table.contains("the picture is mirrored, as from below") && !table.contains("pitch"),
+        "{table}"
+    );
+    // Without --pixel the pitch stays, and the spread is in its mirrors.
+    let mine = String::from_utf8(scratch.bytes("mine.toml")).unwrap();
+    let kept = small.lines().find(|line| line.starts_with("value = \"6.222")).unwrap();
+    assert!(mine.contains(kept) && mine.contains("calibrated from camera.png"), "{mine}");
+    let shown = printed(&scratch, "lamp projector check mine.toml --json");
+    let sigma =
+        serde_json::from_str::<Value>(&shown).unwrap()["projectors"][0]["sigma_um"].as_f64();
+    assert!((sigma.unwrap() / (0.9 * 560.0 / 90.0) - 1.0).abs() < 5e-3, "{shown}");
+    // The light is half as bright at one side. Beyond the dots it stays as it is there.
+    let light =
+        GrayPicture::read(BufReader::new(File::open(scratch.path("light.png")).unwrap())).unwrap();
+    assert_eq!((light.columns, light.rows), (96, 64));
+    let of = |column: usize| f64::from(light.levels[32 * 96 + column]) / 65535.0;
+    let wanted = |place: f64| (0.45 + 0.15 * place / 48.0) / (0.45 + 0.15 * 42.0 / 48.0);
+    for (column, place) in [(20, -27.5), (70, 22.5), (95, 42.0)] {
+        assert!(
+            (of(column) / wanted(place) - 1.0).abs() < 0.01,
+            "{column}: {} for {}",
+            of(column),
+            wanted(place)
+        );
+    }
+    // Plans take both.
+    let plan = "lamp plan column-cure dome.toml --projector mine.toml --material pegda-mw700 --voxel 6um \
+                --flat-field light.png -q -o plan/";
+    let dome =
+        "name = \"dome\"\ndescription = \"\"\n[[lens]]\ndiameter = \"150 um\"\nsag = \"20 um\"\n";
+    scratch.write("dome.toml", dome.as_bytes());
+    scratch.run(plan).succeeds();
+    let refused = |line: &str, words: &[&str]| scratch.run(line).is_refused_with(words);
+    let misused = |line: &str, words: &[&str]| scratch.run(line).is_wrong_usage(words);
+    misused(&format!("{line} --flat-field mine.toml"), &["mine.toml", ".png"]);
+    misused(&format!("{line} --flat-field camera.png"), &["camera.png"]);
+    misused(&format!("{line} --flat-field light.tif"), &["light.tif", ".png"]);
+    refused(&line.replace("camera.png", "dots.tif"), &["dots.tif", "not a complete PNG"]);
+    let other = line.replace("small.toml", "zhao");
+    refused(&other, &["dots.tif", "96 x 64 pixels", "1024 x 768 mirrors"]);
+    let many = line.replace("dots.tif", "plan/bitmaps.tif");
+    refused(&many, &["plan/bitmaps.tif", "images, but a picture shows one", "lamp split --layers"]);
+    misused("lamp target dots --projector small.toml --dot 10 --period 20", &["a third"]);
+    misused("lamp target dots --projector small.toml --dot 10", &["two rows"]);
 }

@@ -2,7 +2,7 @@
 
 /// Inverts a symmetric matrix; `None` if it is singular to rounding. Rows and
 /// columns are scaled first, so that their units do not matter.
-pub(super) fn inverse<const N: usize>(matrix: [[f64; N]; N]) -> Option<[[f64; N]; N]> {
+pub fn inverse<const N: usize>(matrix: [[f64; N]; N]) -> Option<[[f64; N]; N]> {
     let scale: [f64; N] = std::array::from_fn(|i| matrix[i][i].sqrt());
     if scale.iter().any(|&scale| !(scale > 0.0 && scale.is_finite())) {
         return None;

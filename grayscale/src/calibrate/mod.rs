@@ -60,6 +60,8 @@ pub use fit_profiles::{ProfileFit, fit_profiles};
 pub use fit_scan::{LineKind, LinesOf, ScanDirection, ScanFit, fit_scan};
 pub use fit_two_depth::{TwoDepthFit, fit_two_depth};
 pub use fit_widths::{ManyLayersFit, WidthFit, fit_many_layers, fit_widths};
+pub use least_squares::least_squares;
+pub use matrix::inverse;
 pub use measurements::{
     DataError, DepthPoint, LampPoint, LawPoint, LawTable, LinePoint, Measured, ProfilePoint,
     WidthPoint, depth_points, lamp_points, law_points, line_points, profile_points, width_points,

@@ -16,7 +16,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::ShownBitmap;
 use lamp_planning::learn::{
     GlassFit, GlassModel, GlassState, HeightRow, JobError, JobFile, PrintMeasurements,
@@ -28,8 +27,8 @@ use lamp_stack::{Catalogued, Page, sealed};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::GlassPlan;
 use super::target::of_work;
+use super::{GlassPlan, bitmaps_of};
 use crate::documents::{open_stack, read_text};
 use crate::error::Error;
 use crate::watcher::Watcher;
@@ -377,21 +376,7 @@ impl<S: GlassSettings> GlassJob<S> {
     /// Returns the light of bitmaps, and how long all take, in seconds.
     fn shown(&self, path: &Path) -> Result<(<S::Model as GlassModel>::Light, f64), Error> {
         let named = |error: Error| error.at(path.display().to_string());
-        let mut bitmaps: Vec<ShownBitmap> = Vec::new();
-        let display = &self.projector.display;
-        for page in open_stack(path)? {
-            let layer = page.and_then(Page::decode).map_err(|error| named(error.into()))?;
-            let time = ExposureTime::from_ms(layer.info.exposure_ms.unwrap_or_default());
-            let image = layer.image.into_image();
-            if [image.width(), image.height()] != [display.columns, display.rows] {
-                let (width, height) = (image.width(), image.height());
-                return Err(named(Error::work(format!(
-                    "{width} x {height} pixels, but the display of {} has {} x {} mirrors",
-                    self.projector.name, display.columns, display.rows
-                ))));
-            }
-            bitmaps.push(ShownBitmap { image, time });
-        }
+        let bitmaps = bitmaps_of(path, &self.projector)?;
         let seconds = bitmaps.iter().map(|bitmap| bitmap.time.ms()).sum::<f64>() / 1000.0;
         let light = self.settings.light(&self.model, &self.projector, &bitmaps).map_err(named)?;
         Ok((light, seconds))

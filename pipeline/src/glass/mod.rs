@@ -1,6 +1,7 @@
 //! Plans of bitmaps on a fixed glass, from the words of a command: column cure (000), and round parts
 //! by kinetics (003).
 
+mod camera;
 mod column_cure;
 mod column_measures;
 mod column_report;
@@ -9,12 +10,20 @@ mod job;
 mod kinetics_report;
 mod target;
 
+use std::path::Path;
+
+use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::projector::Projector;
 use lamp_planning::target::HeightMap;
 use lamp_planning::{PlanPages, ShownBitmap};
-use lamp_stack::Length;
+use lamp_stack::{Length, Page};
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::Error;
+use crate::documents::open_stack;
+
+pub use camera::CameraSettings;
 pub use column_cure::{
     BitmapCount, ColumnCure, ColumnCureSettings, DoseError, LongestTime, SearchGap,
 };
@@ -54,6 +63,29 @@ impl GlassPlan {
         let Self { part, command, pitch, bitmaps, .. } = self;
         PlanPages { part, command, pitch: *pitch, bitmaps }
     }
+}
+
+/// Reads the bitmaps of a projector from a stack.
+fn bitmaps_of(path: &Path, projector: &Projector) -> Result<Vec<ShownBitmap>, Error> {
+    let named = |error: Error| error.at(path.display().to_string());
+    let mut bitmaps = Vec::new();
+    for page in open_stack(path)? {
+        let layer = page.and_then(Page::decode).map_err(|error| named(error.into()))?;
+        let time = ExposureTime::from_ms(layer.info.exposure_ms.unwrap_or_default());
+        let image = layer.image.into_image();
+        if [image.width(), image.height()] != [projector.display.columns, projector.display.rows] {
+            return Err(named(Error::work(format!(
+                "{} x {} pixels, but the display of {} has {} x {} mirrors",
+                image.width(),
+                image.height(),
+                projector.name,
+                projector.display.columns,
+                projector.display.rows
+            ))));
+        }
+        bitmaps.push(ShownBitmap { image, time });
+    }
+    Ok(bitmaps)
 }
 
 /// Returns a report as JSON.

@@ -1,7 +1,7 @@
 //! Projector files.
 
 use lamp_grayscale::resin::{Intensity, ModelError, plausible};
-use lamp_stack::{Builtin, Catalogued, Length};
+use lamp_stack::{Builtin, CatalogueError, Catalogued, Length};
 use thiserror::Error;
 
 use super::{GrayLight, Lens, Projector, Rays};
@@ -115,6 +115,18 @@ impl Catalogued for Projector {
 }
 
 impl Projector {
+    /// Writes a projector's file, which reads back as the same projector.
+    ///
+    /// # Errors
+    /// Returns an error if [`Self::from_toml`] would refuse what was written.
+    ///
+    /// # Panics
+    /// Never: texts and numbers in tables are TOML.
+    pub fn to_toml(&self) -> Result<String, CatalogueError<ProjectorError>> {
+        let text = toml::to_string(self).expect("texts and numbers in tables are TOML");
+        Self::from_toml(&text).map(|_| text)
+    }
+
     fn check_light(&self) -> Result<(), ProjectorError> {
         if self.rays.is_some() == self.light.is_some() {
             return Err(ProjectorError::Light);

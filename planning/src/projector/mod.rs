@@ -9,6 +9,7 @@
 //! assert!((zhao.irradiance().mw_per_cm2() - 0.18821).abs() < 5e-6);
 //! ```
 
+mod camera;
 mod file;
 mod lens;
 
@@ -17,6 +18,7 @@ use lamp_grayscale::resin::{ExposureTime, Intensity, Power};
 use lamp_stack::{Length, nonempty_text};
 use serde::{Deserialize, Serialize};
 
+pub use camera::{CameraError, CameraFit, CameraPicture};
 pub use file::ProjectorError;
 pub use lens::{Focus, Lens};
 

@@ -21,7 +21,7 @@ pub enum TargetError {
     #[error(transparent)]
     Part(#[from] SliceError),
     /// A picture that cannot be read.
-    #[error("it is not a complete PNG: {0}")]
+    #[error("it is not a complete PNG")]
     Png(#[from] png::DecodingError),
     /// A file that cannot be read.
     #[error(transparent)]

@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, Seek};
 
-use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
+use png::{BitDepth, ColorType, Decoder, Encoder, EncodingError, Limits, Transformations};
 
 use super::TargetError;
 
@@ -49,5 +49,23 @@ impl GrayPicture {
             _ => bytes.iter().map(|&level| u16::from(level) * 257).collect(),
         };
         Ok(Self { columns, rows, levels })
+    }
+
+    /// Returns it as a PNG of 16 bits.
+    ///
+    /// # Errors
+    /// Returns an error if it is empty, or larger than a PNG can be.
+    pub fn to_png(&self) -> Result<Vec<u8>, EncodingError> {
+        let levels: Vec<u8> = self.levels.iter().flat_map(|level| level.to_be_bytes()).collect();
+        let [columns, rows] =
+            [self.columns, self.rows].map(|count| u32::try_from(count).unwrap_or(0));
+        let mut bytes = Vec::new();
+        let mut encoder = Encoder::new(&mut bytes, columns, rows);
+        encoder.set_color(ColorType::Grayscale);
+        encoder.set_depth(BitDepth::Sixteen);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&levels)?;
+        writer.finish()?;
+        Ok(bytes)
     }
 }

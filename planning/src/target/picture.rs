@@ -3,7 +3,7 @@
 use std::io::{BufRead, Seek};
 
 use lamp_stack::Length;
-use png::{BitDepth, ColorType, Encoder, EncodingError};
+use png::EncodingError;
 
 use super::{GrayPicture, HeightMap, TargetError};
 
@@ -71,18 +71,11 @@ impl HeightMap {
         let highest_um = self.highest_um();
         let full_um = if highest_um > 0.0 { highest_um } else { 1.0 };
         let most = f64::from(u16::MAX);
-        let level =
-            |um: &f64| ((um / full_um * most).round().clamp(0.0, most) as u16).to_be_bytes();
-        let levels: Vec<u8> = self.heights_um.iter().flat_map(level).collect();
-        let [columns, rows] =
-            [self.grid.columns, self.grid.rows].map(|count| u32::try_from(count).unwrap_or(0));
-        let mut bytes = Vec::new();
-        let mut encoder = Encoder::new(&mut bytes, columns, rows);
-        encoder.set_color(ColorType::Grayscale);
-        encoder.set_depth(BitDepth::Sixteen);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&levels)?;
-        writer.finish()?;
+        let level = |um: &f64| (um / full_um * most).round().clamp(0.0, most) as u16;
+        let (columns, rows) = (self.grid.columns, self.grid.rows);
+        let picture =
+            GrayPicture { columns, rows, levels: self.heights_um.iter().map(level).collect() };
+        let bytes = picture.to_png()?;
         let (pixel, full) = (Length::from_um(self.grid.pitch_um), Length::from_um(full_um));
         Ok((bytes, MapScale { pixel, full }))
     }
@@ -92,6 +85,8 @@ impl HeightMap {
 mod tests {
     use std::io::Cursor;
 
+    use png::{BitDepth, ColorType, Encoder};
+
     use super::*;
     use crate::target::Grid;
 
@@ -99,7 +94,7 @@ mod tests {
 
     fn png(columns: u32, rows: u32, colour: ColorType, depth: BitDepth, data: &[u8]) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, columns, rows);
+        let mut encoder = Encoder::new(&mut bytes, columns, rows);
         encoder.set_color(colour);
         encoder.set_depth(depth);
         encoder.write_header().unwrap().write_image_data(data).unwrap();

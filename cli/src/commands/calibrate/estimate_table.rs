@@ -23,10 +23,10 @@ pub(super) struct EstimateTable {
 struct CalibrateAnswer {
     /// Name of the measurements, as given.
     input: String,
-    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp`, `scan`, `spread`, `gamma`, `kinetics` or
-    /// `composition`.
+    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp`, `scan`, `spread`, `gamma`, `kinetics`,
+    /// `composition` or `projector`.
     model: &'static str,
-    /// Rows that were used.
+    /// Rows, or pixels of a picture, that were used.
     points: usize,
     /// Rows with nothing left to measure: films that did not cure, squares that were washed away, gaps
     /// that closed.
@@ -80,6 +80,14 @@ struct Group {
 
 schemas! { "lamp-calibrate-1": CalibrateAnswer; }
 
+impl CalibrateAnswer {
+    fn new(input: String, model: &'static str, counts: [usize; 3]) -> Self {
+        let [points, without_measure, blank] = counts;
+        let (parameters, groups) = (Vec::new(), Vec::new());
+        Self { input, model, points, without_measure, blank, r2: None, parameters, groups }
+    }
+}
+
 impl EstimateTable {
     /// Starts with the number of rows that were used, out of all rows of `input`. `none` names the
     /// rows that hold no point.
@@ -94,17 +102,14 @@ impl EstimateTable {
         let rows = points + without + blank;
         let text =
             format!("{points} points of {rows} rows ({without} {none}, {blank} blank left out)\n");
-        let answer = CalibrateAnswer {
-            input,
-            model,
-            points,
-            without_measure: *without,
-            blank: *blank,
-            r2: None,
-            parameters: Vec::new(),
-            groups: Vec::new(),
-        };
-        Self { text, answer, names: 26 }
+        let counts = [points, *without, *blank];
+        Self { text, answer: CalibrateAnswer::new(input, model, counts), names: 26 }
+    }
+
+    /// Starts with the number of pixels of a picture that were used.
+    pub(super) fn of_pixels(input: String, model: &'static str, pixels: usize) -> Self {
+        let answer = CalibrateAnswer::new(input, model, [pixels, 0, 0]);
+        Self { text: format!("{pixels} pixels\n"), answer, names: 34 }
     }
 
     /// Makes room for longer names.

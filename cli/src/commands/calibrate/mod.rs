@@ -6,6 +6,7 @@ mod estimate_table;
 mod gamma;
 mod kinetics;
 mod lamp;
+mod projector;
 mod scan;
 mod spread;
 mod width;
@@ -55,6 +56,7 @@ enum Calibration {
     Gamma(gamma::GammaArgs),
     Kinetics(kinetics::KineticsArgs),
     Composition(composition::CompositionArgs),
+    Projector(projector::ProjectorArgs),
 }
 
 pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
@@ -67,6 +69,7 @@ pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
         Calibration::Gamma(args) => gamma::run(args, common),
         Calibration::Kinetics(args) => kinetics::run(args, common),
         Calibration::Composition(args) => composition::run(args, common),
+        Calibration::Projector(args) => projector::run(args, common),
     }
 }
 

@@ -9,10 +9,10 @@ use lamp_grayscale::target::lines;
 use lamp_pipeline::documents::document;
 use lamp_planning::ecpl::LONGEST_MS;
 use lamp_planning::projector::Projector;
-use lamp_stack::{Destination, Format, Length, Pitch, write_stack};
+use lamp_stack::{Destination, Format, Length, write_stack};
 
 use super::squares::Doses;
-use super::{counted, pages, parse_gap, sorted};
+use super::{counted, pages, parse_gap, pitch_of, sorted};
 use crate::args::options::Common;
 use crate::exit::Exit;
 use crate::streams::{new_folder, write_file, written_to};
@@ -88,9 +88,7 @@ pub(super) fn run(args: &LinesArgs, common: &Common) -> Result<(), Exit> {
             first.image.height()
         )));
     }
-    let pitch = Pitch::of_dpi((25_400.0 / um * 1e4).round() / 1e4).ok_or_else(|| {
-        Exit::usage(format!("images have no resolution for mirrors {um} um apart"))
-    })?;
+    let pitch = pitch_of(&projector)?;
     let mut table = TABLE_HEAD.to_owned();
     for time in &args.times {
         for width in &widths {

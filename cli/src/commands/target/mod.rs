@@ -1,5 +1,6 @@
 //! `lamp target`: the kinds of test images.
 
+mod dots;
 mod grays;
 mod lines;
 mod scan;
@@ -13,6 +14,7 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{ExposureTime, Intensity};
 use lamp_grayscale::target::{TargetError, TargetExposure};
 use lamp_pipeline::documents::document;
+use lamp_planning::projector::Projector;
 use lamp_stack::{Dpi, GrayMask, Layer, Length, PageInfo, Pitch, StackInfo};
 
 use crate::args::options::{Common, Output, parse_distance};
@@ -28,7 +30,8 @@ Examples:
   lamp target scan --doses 150,300mJ/cm2 --material lamp-suspension -o lines/
   lamp target screens -o screens.tif
   lamp target grays -o grays.tif
-  lamp target lines --projector jariwala -o lines/")]
+  lamp target lines --projector jariwala -o lines/
+  lamp target dots --projector jariwala -o dots.tif")]
 pub(crate) struct TargetArgs {
     #[command(subcommand)]
     what: Target,
@@ -41,6 +44,7 @@ enum Target {
     Screens(screens::ScreensArgs),
     Grays(grays::GraysArgs),
     Lines(lines::LinesArgs),
+    Dots(dots::DotsArgs),
 }
 
 pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
@@ -50,6 +54,7 @@ pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
         Target::Screens(args) => screens::run(args, common),
         Target::Grays(args) => grays::run(args, common),
         Target::Lines(args) => lines::run(args, common),
+        Target::Dots(args) => dots::run(args, common),
     }
 }
 
@@ -81,6 +86,13 @@ fn pages(
         info.other.insert("dose_mj_per_cm2".to_owned(), dose.into());
         Ok(Layer { info, pitch: Some(pitch), image: exposure.image.into() })
     })
+}
+
+/// Returns the pitch of images with a pixel for each mirror.
+fn pitch_of(projector: &Projector) -> Result<Pitch, Exit> {
+    let um = projector.pitch.value.um();
+    Pitch::of_dpi((25_400.0 / um * 1e4).round() / 1e4)
+        .ok_or_else(|| Exit::usage(format!("images have no resolution for mirrors {um} um apart")))
 }
 
 /// Writes a stack of one gray image.
