@@ -158,6 +158,20 @@ fn even_times_are_short_and_nearly_as_near() {
 }
 
 #[test]
+fn even_times_are_the_same_on_any_number_of_threads() {
+    let target = map("lens-array", 330);
+    let light = zhao(330, Tracing::Exact);
+    let even = ColumnOptions { dose_error: 0.03, ..options(ColumnObjective::Dose) };
+    let planned = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| plan(&light, &target, pegda(), &even, || false).unwrap().best)
+    };
+    let one = planned(1);
+    assert!(one.relative_gap() <= 1e-6 && one.term > 0.0, "{:e}", one.relative_gap());
+    assert_eq!(one, planned(3));
+}
+
+#[test]
 fn a_plan_that_bears_a_shift_is_better_where_it_is_shifted() {
     let target = map("sphere", 300);
     let light = zhao(300, Tracing::Exact);

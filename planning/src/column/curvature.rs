@@ -47,6 +47,10 @@ impl<C: CurvatureMatrix> CurvatureMatrix for Even<'_, C> {
         product.iter_mut().zip(numbers).for_each(|(out, number)| *out += self.evenness * number);
         product
     }
+
+    fn least(&self) -> f64 {
+        self.of.least() + self.evenness
+    }
 }
 
 /// The sum of these products over some lights, with a weight for each column voxel.

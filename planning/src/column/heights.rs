@@ -3,7 +3,7 @@
 use super::curvature::{Even, Weighted};
 use super::curve::HeightCurve;
 use super::light::GlassLight;
-use super::times::{Allowed, MirrorTimes, Stop, frank_wolfe_gap};
+use super::times::{Allowed, LOOK, MirrorTimes, Stop};
 use crate::numeric::{Bounded, SearchPlace};
 
 /// The difference between cured and wanted heights, in um, on lights that count equally.
@@ -89,7 +89,7 @@ pub(super) fn nearest_heights(
         }
         let problem = Bounded { curvature: &curvature, pull: &pull, high: max_s };
         let here = problem.place(x);
-        let gap = frank_wolfe_gap(&here, max_s);
+        let gap = here.gap(max_s, evenness);
         if gap <= stop.gap * value || steps >= stop.steps || is_stopped() {
             return MirrorTimes::of(here, error_here, allowed, steps);
         }
@@ -97,9 +97,9 @@ pub(super) fn nearest_heights(
         // it.
         let enough = (0.1 * gap).max(0.3 * stop.gap * value);
         let before = steps;
-        let next = problem.search(here.x.clone(), 8, |place, step| {
+        let next = problem.search(here.x.clone(), LOOK, |place, step| {
             steps = before + step;
-            frank_wolfe_gap(place, max_s) <= enough || steps >= stop.steps || is_stopped()
+            place.gap(max_s, evenness) <= enough || steps >= stop.steps || is_stopped()
         });
         (x, squares) = nearer(error, &term, &here, &next.x, value);
         steps += 1;

@@ -223,20 +223,31 @@ fn spread_of(projector: &Projector) -> MirrorSpread {
     }
 }
 
+/// Rows of a product that are computed together.
+const LANES: usize = 16;
+
 /// Returns the product of a matrix for each axis, x first, with an image.
 pub(super) fn product([along, down]: &[Taps; 2], image: &[f64]) -> Vec<f64> {
-    let mut out = vec![0.0; along.rows() * down.rows()];
-    let rows = out.par_chunks_mut(along.rows()).enumerate();
-    rows.for_each_init(
-        || vec![0.0; along.columns()],
-        |line, (row, out)| {
-            wide(|| {
-                // H is the product of a matrix for each axis: two passes of a few numbers instead
-                // of mirrors times columns.
+    let width = along.rows();
+    let mut out = vec![0.0; width * down.rows()];
+    let blocks = out.par_chunks_mut(LANES * width).enumerate();
+    let buffers = || {
+        let [lines, sums] = [along.columns(), width].map(|count| vec![[0.0; LANES]; count]);
+        (vec![0.0; along.columns()], lines, sums)
+    };
+    blocks.for_each_init(buffers, |(line, lines, sums), (block, out)| {
+        wide(|| {
+            // H is the product of a matrix for each axis: two passes of a few numbers instead of
+            // mirrors times columns.
+            for (lane, row) in (block * LANES..).take(out.len() / width).enumerate() {
                 down.apply_across(row, image, line);
-                along.apply(line, out);
-            });
-        },
-    );
+                lines.iter_mut().zip(&*line).for_each(|(to, at)| to[lane] = *at);
+            }
+            along.apply(lines, sums);
+            for (lane, out) in out.chunks_exact_mut(width).enumerate() {
+                out.iter_mut().zip(&*sums).for_each(|(out, sums)| *out = sums[lane]);
+            }
+        });
+    });
     out
 }

@@ -260,11 +260,11 @@ mod tests {
         let exact = taps(MIRRORS, VOXELS, MirrorSpread::Cone(12.0), Tracing::Exact);
         let rays = Tracing::Rays { points: 400, directions: 400 };
         let counted = taps(MIRRORS, VOXELS, MirrorSpread::Cone(12.0), rays);
-        let line: Vec<_> = (0..MIRRORS.count).map(|mirror| ((mirror * 7) % 5) as f64).collect();
-        let [mut a, mut b] = [vec![0.0; 120], vec![0.0; 120]];
+        let line: Vec<_> = (0..MIRRORS.count).map(|mirror| [((mirror * 7) % 5) as f64]).collect();
+        let [mut a, mut b] = [vec![[0.0]; 120], vec![[0.0]; 120]];
         exact.apply(&line, &mut a);
         counted.apply(&line, &mut b);
-        for (exact, counted) in a.iter().zip(&b) {
+        for (exact, counted) in a.as_flattened().iter().zip(b.as_flattened()) {
             assert!((exact - counted).abs() < 0.01, "{exact} {counted}");
         }
     }

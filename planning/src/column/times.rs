@@ -1,7 +1,5 @@
 //! Times of mirrors, and a bound on their distance from the best (000 section 4.2).
 
-use rayon::prelude::*;
-
 use super::curvature::{Even, Normal};
 use super::light::GlassLight;
 use crate::numeric::{Bounded, SearchPlace};
@@ -35,7 +33,7 @@ pub struct MirrorTimes {
     pub error: f64,
     /// The value of the term of [`Allowed::evenness`]: a search minimizes its sum with the error.
     pub term: f64,
-    /// The most by which the least sum can be smaller: the Frank-Wolfe gap.
+    /// The most by which the least sum can be smaller.
     pub gap: f64,
     /// The most by which the least error of any allowed times, however uneven, can be smaller. Errors of
     /// heights are not convex, so that there it is an estimate, as the gap is.
@@ -53,12 +51,12 @@ impl MirrorTimes {
     /// Creates them from where a search of the sum ended.
     pub(super) fn of(place: SearchPlace, error: f64, allowed: Allowed, steps: usize) -> Self {
         let Allowed { max_s, evenness } = allowed;
-        let gap = frank_wolfe_gap(&place, max_s);
+        let gap = place.gap(max_s, evenness);
         let term = 0.5 * evenness * place.x.iter().map(|time| time * time).sum::<f64>();
         let SearchPlace { x, mut slopes } = place;
         slopes.iter_mut().zip(&x).for_each(|(slope, time)| *slope -= evenness * time);
         let plain = SearchPlace { x, slopes };
-        let price = if evenness > 0.0 { frank_wolfe_gap(&plain, max_s) } else { gap };
+        let price = if evenness > 0.0 { plain.gap(max_s, 0.0) } else { gap };
         Self { error, term, gap, price, steps, seconds: plain.x }
     }
 
@@ -68,22 +66,12 @@ impl MirrorTimes {
     }
 }
 
-/// Returns the Frank-Wolfe gap: no times between zero and `high` have an error smaller by more.
-///
-/// The error is convex, so it lies above `error + slopes (t - x)` for all times t.
-pub(super) fn frank_wolfe_gap(place: &SearchPlace, high: f64) -> f64 {
-    let numbers = place.x.par_chunks(1 << 13).zip(place.slopes.par_chunks(1 << 13));
-    let of_chunk = |(x, slopes): (&[f64], &[f64])| -> f64 {
-        // The largest value of slopes (x - t) over all t between zero and the bound: each t is at
-        // the end that its slope prefers.
-        x.iter().zip(slopes).map(|(x, slope)| slope * x + high * (-slope).max(0.0)).sum()
-    };
-    numbers.map(of_chunk).collect::<Vec<_>>().into_iter().sum()
-}
+/// Steps after which a search looks whether it may end.
+pub(super) const LOOK: usize = 4;
 
 /// Steps towards the nearest times, uneven as they may be, and the share of the error that is near
 /// enough.
-const STEPS_TO_PRICE: usize = 48;
+const STEPS_TO_PRICE: usize = 24;
 const NEAR: f64 = 1e-3;
 
 /// An error below this share of the error without light counts as zero.
@@ -110,14 +98,12 @@ pub fn nearest_times(
     let dark = 0.5 * wanted.iter().map(|dose| dose * dose).sum::<f64>();
     let sum = |place: &SearchPlace| dark + fall(place, &pull);
     let mut steps = 0;
-    let place = problem.search(vec![0.0; pull.len()], 8, |place, step| {
+    let place = problem.search(vec![0.0; pull.len()], LOOK, |place, step| {
         steps = step;
-        let gap = frank_wolfe_gap(place, max_s);
+        let gap = place.gap(max_s, evenness);
         let is_near = gap <= stop.gap * sum(place).max(NOTHING * dark);
         is_near || step >= stop.steps || is_stopped()
     });
-    // Slopes summed over steps carry rounding errors: the proof uses newly computed ones.
-    let place = problem.place(place.x);
     let sum = sum(&place);
     let mut times = MirrorTimes::of(place, 0.0, allowed, steps);
     times.error = (sum - times.term).max(0.0);
@@ -125,12 +111,11 @@ pub fn nearest_times(
         // A few steps towards the nearest times alone: wherever they end, their bound holds, and mostly it
         // is nearer than the bound of the even times.
         let plain = Bounded { curvature: &normal, pull: &pull, high: max_s };
-        let place = plain.search(times.seconds.clone(), 8, |place, step| {
-            let gap = frank_wolfe_gap(place, max_s);
+        let place = plain.accelerate(times.seconds.clone(), LOOK, |place, step| {
+            let gap = place.gap(max_s, 0.0);
             gap <= NEAR * times.error || step >= STEPS_TO_PRICE || is_stopped()
         });
-        let place = plain.place(place.x);
-        let least = dark + fall(&place, &pull) - frank_wolfe_gap(&place, max_s);
+        let least = dark + fall(&place, &pull) - place.gap(max_s, 0.0);
         times.price = times.price.min(times.error - least).max(0.0);
     }
     times

@@ -1,4 +1,4 @@
-//! Finds the least value of a quadratic function between bounds: conjugate gradients.
+//! Conjugate gradients between bounds.
 //!
 //! Source: Z. Dostál and J. Schöberl, *Minimizing quadratic functions subject to bound
 //! constraints with the rate of convergence and finite termination*, Comput. Optim. Appl. 30
@@ -6,31 +6,10 @@
 
 use rayon::prelude::*;
 
-/// The numbers that a thread takes at a time. Sums are added chunk by chunk in order, so that the
-/// number of threads changes no bit.
-const CHUNK: usize = 1 << 13;
+use super::{Bounded, CHUNK, CurvatureMatrix, SearchPlace};
+
 /// The length of steps along the slopes, in units of 1 / |A|: below 2, it cannot raise the value.
 const STEP: f64 = 1.9;
-
-/// A matrix that is symmetric and has no negative eigenvalue, as a product.
-pub(crate) trait CurvatureMatrix: Sync {
-    /// Returns the product with numbers.
-    fn apply(&self, numbers: &[f64]) -> Vec<f64>;
-}
-
-/// The least value of `x A x / 2 - b x` for `x` between zero and a bound.
-pub(crate) struct Bounded<'a, C> {
-    pub(crate) curvature: &'a C,
-    /// b: the slopes at zero, negated.
-    pub(crate) pull: &'a [f64],
-    pub(crate) high: f64,
-}
-
-/// Where a search stands: the numbers, and the slopes there.
-pub(crate) struct SearchPlace {
-    pub(crate) x: Vec<f64>,
-    pub(crate) slopes: Vec<f64>,
-}
 
 /// How a number may move.
 #[derive(Clone, Copy)]
@@ -61,9 +40,8 @@ struct Sums {
 }
 
 impl<C: CurvatureMatrix> Bounded<'_, C> {
-    /// Searches from `x` until `is_done` returns true. It is called at every `look`th step with the
-    /// number of steps so far.
-    pub(crate) fn search(
+    /// Searches face by face, as [`Self::search`] does. A step takes one or two products.
+    pub(super) fn proportion(
         &self,
         x: Vec<f64>,
         look: usize,
@@ -116,21 +94,8 @@ impl<C: CurvatureMatrix> Bounded<'_, C> {
                 direction = self.free(&place);
             }
         }
-        place
-    }
-
-    /// Returns the slopes at `x`.
-    pub(crate) fn place(&self, x: Vec<f64>) -> SearchPlace {
-        let mut slopes = self.curvature.apply(&x);
-        slopes.iter_mut().zip(self.pull).for_each(|(slope, pull)| *slope -= pull);
-        SearchPlace { x, slopes }
-    }
-
-    /// Returns a bound on the greatest eigenvalue: no number of the matrix is negative.
-    fn greatest(&self) -> f64 {
-        // The greatest sum of a row bounds the greatest eigenvalue (Gershgorin).
-        let sums = self.curvature.apply(&vec![1.0; self.pull.len()]);
-        sums.into_iter().fold(f64::MIN_POSITIVE, f64::max)
+        // Slopes summed over steps carry rounding errors: proofs use newly computed ones.
+        self.place(place.x)
     }
 
     fn free(&self, place: &SearchPlace) -> Vec<f64> {
@@ -226,30 +191,5 @@ impl<C: CurvatureMatrix> Bounded<'_, C> {
         numbers.with_min_len(CHUNK).for_each(|((&x, &slope), direction)| {
             *direction = slope_at(x, slope, self.high).free - turn * *direction;
         });
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A matrix of one number.
-    struct One(f64);
-
-    impl CurvatureMatrix for One {
-        fn apply(&self, numbers: &[f64]) -> Vec<f64> {
-            vec![self.0 * numbers[0]]
-        }
-    }
-
-    #[test]
-    fn a_search_may_go_on_where_nothing_is_left() {
-        for k in 1..200 {
-            let (curvature, pull) = (One(1.0 / f64::from(k)), [f64::from(k % 17) + 0.1]);
-            let problem = Bounded { curvature: &curvature, pull: &pull, high: 1e3 };
-            let place = problem.search(vec![0.0], 50, |_, step| step >= 50);
-            let least = (pull[0] / curvature.0).min(1e3);
-            assert!((place.x[0] / least - 1.0).abs() < 1e-12, "{k}: {} for {least}", place.x[0]);
-        }
     }
 }
