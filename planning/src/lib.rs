@@ -11,6 +11,7 @@
 
 mod bitmaps;
 mod blur;
+mod coarse;
 pub mod column;
 pub mod cure_section;
 mod doses;

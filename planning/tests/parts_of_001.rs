@@ -1,6 +1,6 @@
 //! The helix and the slope of 001, planned, compared with its numbers and with other rules.
 
-use lamp_fixtures::{HELIX_CURED, Voxels, dna_helix, overhang_slope};
+use lamp_fixtures::{HELIX_CURED, Voxels, dna_helix, dna_helix_of, overhang_slope};
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_planning::solver::{Operator, Shape};
 use lamp_planning::voxels::{
@@ -29,6 +29,21 @@ impl Case {
         let mut doses = case.doses(&case.white());
         doses.sort_by(f64::total_cmp);
         Self { critical: doses[doses.len() - HELIX_CURED], ..case }
+    }
+
+    /// The helix in smaller voxels, under the same light.
+    fn helix_of(parts: u32) -> Self {
+        let (coarse, times) = (Self::helix(), f64::from(parts));
+        let fade = coarse.fade / times;
+        // A lit pixel is smaller, and a wide field has so many times its light; and a voxel of 56 um
+        // is so many layers, each of which adds its light and dims the others'.
+        let layers = (0..parts).map(|layer| 10_f64.powf(-fade * f64::from(layer))).sum::<f64>();
+        Self {
+            part: dna_helix_of(parts),
+            fade,
+            sigma: coarse.sigma * times,
+            critical: coarse.critical * times * times * layers,
+        }
     }
 
     /// White light makes the notch this thick.
@@ -117,6 +132,20 @@ impl Case {
 
     /// Plans, and returns the light of the gray levels with the outcome.
     fn plan(&self, options: &Options) -> (Outcome, Vec<f64>) {
+        let [width, height, _] = self.part.size().map(|size| size as u32);
+        let of_layer = |layer: &Layer| {
+            let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
+            let light = |(column, row)| f64::from(layer.image.level(column, row)) / 255.0;
+            places.map(light).map(|share| share.powf(GAMMA)).collect()
+        };
+        let mut layers: Vec<Vec<f64>> = Vec::new();
+        let outcome = self.plan_layers(options, |layer| layers.push(of_layer(&layer)));
+        layers.reverse();
+        (outcome, layers.concat())
+    }
+
+    /// Plans, and calls `each` with every layer, bottom first.
+    fn plan_layers(&self, options: &Options, mut each: impl FnMut(Layer)) -> Outcome {
         let light = Light {
             intensity: Intensity::from_mw_per_cm2(1.0),
             intensity_of: IntensityOf::Pixel(self.part.pitch()),
@@ -134,16 +163,8 @@ impl Case {
         });
         let options = Options { around: Some(0), ..*options };
         let mut planned = plan(layers, &light, &options, |_| {}).unwrap();
-        let of_layer = |layer: &Layer| {
-            let [width, height, _] = self.part.size().map(|size| size as u32);
-            let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
-            let light = |(column, row)| f64::from(layer.image.level(column, row)) / 255.0;
-            places.map(light).map(|share| share.powf(GAMMA)).collect()
-        };
-        let mut layers: Vec<Vec<f64>> =
-            planned.by_ref().map(|layer| of_layer(&layer.unwrap())).collect();
-        layers.reverse();
-        (planned.outcome(), layers.concat())
+        planned.by_ref().for_each(|layer| each(layer.unwrap()));
+        planned.outcome()
     }
 }
 
@@ -190,6 +211,22 @@ fn nearly_nothing_of_the_helix_is_wrong_in_the_end() {
     let [over, _] = percent_less(&helix.part, &outcome);
     assert!(over >= 98.0, "{over}");
     assert!(share_lost(&outcome) <= 0.02, "{:?}", outcome.after.counts);
+    assert!(outcome.bound <= outcome.after.cost && outcome.gap() <= 1.2e-3, "{}", outcome.gap());
+}
+
+/// 18 million voxels, and light that spreads over 13 pixels: `cargo test -p lamp-planning helix_in_fine --
+/// --ignored --nocapture` prints the figures of benches/README.md.
+#[test]
+#[ignore = "it takes minutes"]
+fn the_helix_in_fine_voxels_is_planned_as_well() {
+    let parts = std::env::var("LAMP_PARTS").map_or(5, |parts| parts.parse().unwrap());
+    let helix = Case::helix_of(parts);
+    let outcome = helix.plan_layers(&Options::default(), drop);
+    let iterations = outcome.search.last().map_or(0, |last| last.iteration);
+    let [over, _] = percent_less(&helix.part, &outcome);
+    println!("gap {:.6}, {iterations} iterations, {over:.2} % less overcured", outcome.gap());
+    println!("P0 {} P {} D {}", outcome.before.cost, outcome.after.cost, outcome.bound);
+    println!("{:?} {:?}", outcome.before.counts, outcome.after.counts);
     assert!(outcome.bound <= outcome.after.cost && outcome.gap() <= 1.2e-3, "{}", outcome.gap());
 }
 

@@ -74,19 +74,32 @@ impl<T: Real> Operator<T> {
         self.layers.len()
     }
 
+    /// Returns the number of voxels up to the last layer with light of its own.
+    pub(crate) fn lit_voxels(&self) -> usize {
+        let last = self.layers.iter().rposition(|layer| layer.own != 0.0);
+        last.map_or(0, |last| last + 1) * self.plane()
+    }
+
+    /// Leaves out all layers after the first ones.
+    pub(crate) fn keep_layers(&mut self, layers: usize) {
+        self.layers.truncate(layers);
+    }
+
     pub(crate) fn room(&self) -> ChunkRoom<T> {
         self.chunks.room()
     }
 
-    /// Computes the doses of all voxels from the light of all pixels.
+    /// Computes the doses of all voxels from the light of all pixels, or at least of those in layers
+    /// that have any.
     pub fn doses(&self, light: &[T], doses: &mut [T]) {
         let (plane, mut room) = (self.plane(), self.room());
         if plane == 0 {
             return;
         }
         let mut above: &mut [T] = &mut [];
-        let layers = light.chunks_exact(plane).zip(doses.chunks_exact_mut(plane));
-        for (layer, (light, doses)) in layers.enumerate() {
+        let mut light = light.chunks_exact(plane);
+        for (layer, doses) in doses.chunks_exact_mut(plane).enumerate() {
+            let light = light.next().unwrap_or_default();
             self.doses_of_layer(layer, light, above, doses, &mut room);
             above = doses;
         }
@@ -125,15 +138,16 @@ impl<T: Real> Operator<T> {
         );
     }
 
-    /// Computes the cost of one unit of light of each pixel from `prices`, the prices of doses.
+    /// Computes the cost of one unit of light of each pixel from `prices`, the prices of doses; or at
+    /// least of the pixels in layers that have any light.
     pub fn prices_of_light(&self, prices: &[T], of_light: &mut [T]) {
         let (plane, mut room) = (self.plane(), self.room());
         if plane == 0 {
             return;
         }
         let mut below = vec![T::default(); plane];
-        let layers = prices.chunks_exact(plane).zip(of_light.chunks_exact_mut(plane)).enumerate();
-        for (layer, (prices, of_light)) in layers.rev() {
+        for (layer, prices) in prices.chunks_exact(plane).enumerate().rev() {
+            let of_light = of_light.chunks_exact_mut(plane).nth(layer).unwrap_or_default();
             self.prices_of_layer(layer, prices, &mut below, of_light, &mut room);
         }
     }

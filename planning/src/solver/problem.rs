@@ -160,18 +160,38 @@ impl<T: Real> Problem<T> {
     }
 
     /// Returns a lower bound on the cost of any light, from any prices within their bounds and the
-    /// cost of light at these prices.
+    /// cost of light at these prices, at least of the layers that have any.
     pub fn bound(&self, prices: &[T], of_light: &[T]) -> f64 {
         // Weak duality: for any price within the slopes, price (dose - aim) is at most the cost.
         // Summed over all voxels, doses become light times its cost, and each pixel alone takes the
         // end with the least cost.
-        let term = |((&price, &of_light), (&role, &incoming)): ((&T, &T), (&Role, &T))| {
-            let light = self.terms.light_bounds(role);
-            let of_light = of_light.f64();
-            let least = (of_light * light.low.f64()).min(of_light * light.high.f64());
-            least + price.f64() * (incoming.f64() - self.terms.aim(role).f64())
+        let doses = prices.iter().zip(self.roles.iter().zip(&self.incoming));
+        let of_doses = |(&price, (&role, &incoming)): (&T, (&Role, &T))| {
+            price.f64() * (incoming.f64() - self.terms.aim(role).f64())
         };
-        prices.iter().zip(of_light).zip(self.roles.iter().zip(&self.incoming)).map(term).sum()
+        let of_pixel = |(&of_light, &role): (&T, &Role)| {
+            let (light, of_light) = (self.terms.light_bounds(role), of_light.f64());
+            (of_light * light.low.f64()).min(of_light * light.high.f64())
+        };
+        let of_light: f64 = of_light.iter().zip(&self.roles).map(of_pixel).sum();
+        of_light + doses.map(of_doses).sum::<f64>()
+    }
+
+    /// Leaves out the layers below those with light whose doses cost nothing, however bright the light
+    /// is. `brightest` has the doses of the brightest light.
+    pub(crate) fn leave_out_below(&mut self, brightest: &[T]) {
+        let costs = |voxel: &usize| {
+            let role = self.roles[*voxel];
+            // No pixel makes a dose smaller: the brightest light makes the largest doses.
+            let dose = brightest[*voxel] + self.incoming[*voxel];
+            role.has(Role::CURED) || self.terms.cost(role, dose) > 0.0
+        };
+        let lit = self.operator.lit_voxels();
+        let last = (lit..self.roles.len()).rev().find(costs);
+        let voxels = last.map_or(lit, |voxel| voxel + 1);
+        self.operator.keep_layers(voxels.div_ceil(self.operator.plane().max(1)));
+        self.roles.truncate(self.operator.voxels());
+        self.incoming.truncate(self.operator.voxels());
     }
 
     /// Returns the light of all pixels at their upper bounds.

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use crate::blur::Real;
+use crate::blur::{ChunkRoom, Real};
 use crate::solver::problem::Problem;
 use crate::wide::wide;
 
@@ -65,7 +65,8 @@ const LONG: f64 = 0.36;
 /// Steps in light are at first longer than steps in prices by 1 over this.
 const FIRST_WEIGHT: f64 = 0.3;
 
-/// Light and prices, and the doses and light costs that follow from them.
+/// Light and prices, and the doses and light costs that follow from them. Light and its costs end with
+/// the last layer that has any.
 #[derive(Clone)]
 struct Iterate<T> {
     light: Vec<T>,
@@ -75,9 +76,11 @@ struct Iterate<T> {
 }
 
 impl<T: Real> Iterate<T> {
-    fn new(problem: &Problem<T>, light: Vec<T>, prices: Vec<T>) -> Self {
-        let nothing = vec![T::default(); light.len()];
-        let mut start = Self { light, prices, doses: nothing.clone(), of_light: nothing };
+    fn new(problem: &Problem<T>, mut light: Vec<T>, prices: Vec<T>) -> Self {
+        light.truncate(problem.operator.lit_voxels());
+        light.shrink_to_fit();
+        let [doses, of_light] = [prices.len(), light.len()].map(|len| vec![T::default(); len]);
+        let mut start = Self { light, prices, doses, of_light };
         problem.operator.doses(&start.light, &mut start.doses);
         problem.operator.prices_of_light(&start.prices, &mut start.of_light);
         start
@@ -163,6 +166,7 @@ pub fn solve<T: Real>(
         prices: now.prices.clone(),
         progress: vec![SearchProgress { iteration: 0, cost, bound }],
     };
+    let mut room = problem.operator.room();
     let (mut weight, mut since) = (FIRST_WEIGHT, 0);
     let (mut gap_at_restart, mut gap_before) = (cost - bound, f64::INFINITY);
     for iteration in 1..=until.iterations {
@@ -173,7 +177,8 @@ pub fn solve<T: Real>(
         // Halpern's weights (k + 1) / (k + 2), with k = 0 at each restart: the anchor counts less
         // and less.
         let share = f64::from(since) / f64::from(since + 1);
-        SearchIteration::new(problem, &steps, weight, share).take(&mut now, &mut next, &anchor);
+        let iterate = SearchIteration::new(problem, &steps, weight, share);
+        iterate.take(&mut now, &mut next, &anchor, &mut room);
         if iteration % LOOK_AFTER != 0 {
             continue;
         }
@@ -201,6 +206,7 @@ pub fn solve<T: Real>(
             gap_before = gap;
         }
     }
+    best.light.resize(voxels, T::default());
     Solution { light: best.light, prices: best.prices, progress: best.progress }
 }
 
@@ -265,32 +271,39 @@ impl<'a, T: Real> SearchIteration<'a, T> {
 
     /// Goes down through the layers for light and prices, and up for the prices of light. Reflects
     /// `now` at `next`, and draws the result toward the anchor.
-    fn take(&self, now: &mut Iterate<T>, next: &mut Iterate<T>, anchor: &Iterate<T>) {
+    fn take(
+        &self,
+        now: &mut Iterate<T>,
+        next: &mut Iterate<T>,
+        anchor: &Iterate<T>,
+        room: &mut ChunkRoom<T>,
+    ) {
         let operator = &self.problem.operator;
         // One pass down and one up do all the work of an iteration while a layer is in the cache.
-        let (plane, mut room) = (operator.plane(), operator.room());
+        let plane = operator.plane();
         for layer in 0..operator.layer_count() {
             let here = layer * plane..(layer + 1) * plane;
+            let lit = here.start.min(next.light.len())..here.end.min(next.light.len());
             let above = layer.saturating_sub(1) * plane..layer * plane;
-            self.step_light(here.clone(), now, next);
+            self.step_light(lit.clone(), now, next);
             let (done, doses) = next.doses.split_at_mut(here.start);
-            let light = &next.light[here.clone()];
-            operator.doses_of_layer(layer, light, &done[above], &mut doses[..plane], &mut room);
+            let light = &next.light[lit.clone()];
+            operator.doses_of_layer(layer, light, &done[above], &mut doses[..plane], room);
             self.step_prices(here.clone(), now, next);
-            let draw = |now: &mut [T], next: &[T], anchor: &[T]| {
+            let draw = |here: &Range<usize>, now: &mut [T], next: &[T], anchor: &[T]| {
                 self.draw(&mut now[here.clone()], &next[here.clone()], &anchor[here.clone()]);
             };
-            draw(&mut now.light, &next.light, &anchor.light);
-            draw(&mut now.doses, &next.doses, &anchor.doses);
-            draw(&mut now.prices, &next.prices, &anchor.prices);
+            draw(&lit, &mut now.light, &next.light, &anchor.light);
+            draw(&here, &mut now.doses, &next.doses, &anchor.doses);
+            draw(&here, &mut now.prices, &next.prices, &anchor.prices);
         }
         let mut sums = vec![T::default(); plane];
         for layer in (0..operator.layer_count()).rev() {
             let here = layer * plane..(layer + 1) * plane;
-            let of_light = &mut next.of_light[here.clone()];
-            let prices = &next.prices[here.clone()];
-            operator.prices_of_layer(layer, prices, &mut sums, of_light, &mut room);
-            self.draw(&mut now.of_light[here.clone()], of_light, &anchor.of_light[here]);
+            let lit = here.start.min(next.light.len())..here.end.min(next.light.len());
+            let of_light = &mut next.of_light[lit.clone()];
+            operator.prices_of_layer(layer, &next.prices[here], &mut sums, of_light, room);
+            self.draw(&mut now.of_light[lit.clone()], of_light, &anchor.of_light[lit]);
         }
     }
 

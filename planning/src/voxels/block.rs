@@ -132,7 +132,7 @@ impl PlannedWindow<'_> {
     pub(crate) fn plan(&self, tile: usize) -> BlockResult {
         let core = self.grid.tile(tile);
         // Light far from every edge stays white or black: only chunks near edges are unknowns.
-        let area = self.area(&core);
+        let mut area = self.area(&core);
         let operator = Operator::of_chunks(
             area.shape,
             self.blur.clone(),
@@ -147,7 +147,12 @@ impl PlannedWindow<'_> {
         let lit = self.lit * area.starts.len() * LANES;
         // The gap is a share of the cost of white light, so that it means the same for all parts.
         let unplanned = problem.cost(&doses[..lit]);
+        if lit > 0 {
+            problem.leave_out_below(&doses);
+            area.shape.layers = problem.operator.layer_count();
+        }
         let (light, prices) = self.start(&area, &problem, &doses);
+        drop(doses);
         let least = LEAST_ERROR * lit as f64;
         let until = Search { gap: self.gap * unplanned.max(least), iterations: MOST_ITERATIONS };
         let mut solution = solve(&problem, light, prices, until);
@@ -268,35 +273,34 @@ impl PlannedWindow<'_> {
         let border = self.blur.radius();
         let view = area.rect.grown(border);
         let wide = Shape::holding(area.shape.layers, view.height(), view.width());
+        let operator = Operator::new(wide, self.blur.clone(), self.lights.to_vec());
+        let mut room = operator.room();
         let mut levels = vec![0; wide.plane()];
-        let mut light = Vec::with_capacity(wide.voxels());
-        for layer in 0..area.shape.layers {
-            self.planned(layer, &view, wide.width, &mut levels);
-            light.extend(levels.iter().map(|&level| self.levels.light(level)));
-            let of_layer = &mut light[layer * wide.plane()..];
-            for start in &area.starts {
-                let (row, column) = (start / area.shape.width, start % area.shape.width);
-                let inside = LANES.min(area.rect.width() - column);
-                let place = (row + border) * wide.width + column + border;
-                // Pixels that are planned here must not count twice.
-                of_layer[place..place + inside].fill(0.0);
-            }
-        }
-        let mut doses = vec![0.0; wide.voxels()];
-        Operator::new(wide, self.blur.clone(), self.lights.to_vec()).doses(&light, &mut doses);
+        let [mut light, mut doses, mut last] = [(); 3].map(|()| vec![0.0; wide.plane()]);
         let mut above = vec![0.0; area.shape.plane()];
         self.above.copy(&area.rect, 0.0, area.shape.width, &mut above);
         let mut incoming = Vec::with_capacity(area.voxels());
         let mut passed = 1.0;
-        for (doses, of) in doses.chunks_exact(wide.plane()).zip(self.lights) {
+        for (layer, of) in self.lights.iter().enumerate() {
+            self.planned(layer, &view, wide.width, &mut levels);
+            light.iter_mut().zip(&levels).for_each(|(of, level)| *of = self.levels.light(*level));
+            let place = |start: usize| {
+                let (row, column) = (start / area.shape.width, start % area.shape.width);
+                ((row + border) * wide.width + column + border, column)
+            };
+            for &start in &area.starts {
+                let (place, column) = place(start);
+                // Pixels that are planned here must not count twice.
+                light[place..place + LANES.min(area.rect.width() - column)].fill(0.0);
+            }
+            operator.doses_of_layer(layer, &light, &last, &mut doses, &mut room);
             // 001 eq. 5: the layers above the window fade by the product of what each layer passes.
             passed *= of.passed as f32;
-            for (start, above) in area.starts.iter().zip(area.chunks(&above)) {
-                let (row, column) = (start / area.shape.width, start % area.shape.width);
-                let place = (row + border) * wide.width + column + border;
-                let own = doses[place..].iter().chain(std::iter::repeat(&0.0));
+            for (&start, above) in area.starts.iter().zip(area.chunks(&above)) {
+                let own = doses[place(start).0..].iter().chain(std::iter::repeat(&0.0));
                 incoming.extend(above.iter().zip(own).map(|(&above, &own)| above * passed + own));
             }
+            std::mem::swap(&mut doses, &mut last);
         }
         incoming
     }

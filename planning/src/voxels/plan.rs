@@ -20,7 +20,7 @@ use crate::voxels::roles::RoleRules;
 use crate::voxels::setting::{VoxelSetting, price};
 
 /// Changes when the same options and layers give other gray levels.
-pub const VOXELS_CODE: u32 = 1;
+pub const VOXELS_CODE: u32 = 2;
 
 /// Why a stack cannot be planned.
 #[derive(Debug, Error)]
@@ -64,7 +64,6 @@ pub enum VoxelPlanError {
 /// 001 makes each target a constraint. No target of its appendix A has a multiplier above 17.2, so
 /// all of them are kept there. Elsewhere, about 1 % of targets, the ones that white light only just
 /// cures, are given up for the sake of the voxels that keeping them would cure around them.
-/// just cures, are given up for what keeping them would cure around them.
 const PRICE_OF_TARGETS: f32 = 50.0;
 /// The most voxels of a window that are planned in one piece.
 const ONE_PIECE: usize = 4 << 20;
