@@ -125,32 +125,62 @@ fn sums_of(wish: &WantedDoses<'_>, clusters: &[u16], count: usize) -> ClusterSum
     sums
 }
 
+/// The light of clusters at one place.
+struct ClusterLight {
+    /// The light of each cluster.
+    sums: Vec<f64>,
+    /// The clusters that have any.
+    lit: Vec<usize>,
+}
+
+impl ClusterLight {
+    fn zero(clusters: usize) -> Self {
+        Self { sums: vec![0.0; clusters], lit: Vec::new() }
+    }
+
+    fn add(&mut self, cluster: usize, share: f64) {
+        if share == 0.0 {
+            return;
+        }
+        if self.sums[cluster] == 0.0 {
+            self.lit.push(cluster);
+        }
+        self.sums[cluster] += share;
+    }
+
+    /// Moves the light of all clusters that have any to a list, and leaves none.
+    fn take(&mut self, to: &mut Vec<(usize, f64)>) {
+        to.clear();
+        to.extend(self.lit.drain(..).map(|lit| (lit, std::mem::take(&mut self.sums[lit]))));
+    }
+}
+
 /// Adds the light that clusters bring to a row of column voxels.
 fn add_row(sums: &mut ClusterSums, wish: &WantedDoses<'_>, clusters: &[u16], row: usize) {
     let setup = wish.light.setup();
     let [width, columns] = [setup.mirrors[0], setup.voxels[0]];
     let [along, down] = wish.light.taps();
     let (top, heights) = down.row(row);
+    let mut here = ClusterLight::zero(sums.pull.len());
+    // Light separates into a factor for each axis (`spread.rs`): first each column of mirrors brings
+    // its light to the row, then each voxel of the row sees the columns.
+    let mut of_columns = vec![Vec::new(); width];
+    for (mirror_column, of_column) in of_columns.iter_mut().enumerate() {
+        for (mirror_row, &by) in (top..).zip(heights) {
+            let mirror = mirror_row * width + mirror_column;
+            if let Some(cluster) = usize::from(clusters[mirror]).checked_sub(1) {
+                here.add(cluster, by * setup.irradiance * wish.light.flat(mirror));
+            }
+        }
+        here.take(of_column);
+    }
     let mut light: Vec<(usize, f64)> = Vec::new();
     for column in 0..columns {
         let (left, widths) = along.row(column);
-        light.clear();
-        // Light separates into a factor for each axis (`spread.rs`): the light of a mirror is the
-        // product of both.
-        for (mirror_row, &by) in (top..).zip(heights) {
-            let start = mirror_row * width + left;
-            for (mirror, &share) in (start..start + widths.len()).zip(widths) {
-                let cluster = usize::from(clusters[mirror]);
-                let share = share * by * setup.irradiance * wish.light.flat(mirror);
-                if cluster == 0 || share == 0.0 {
-                    continue;
-                }
-                match light.iter_mut().find(|(other, _)| *other == cluster - 1) {
-                    Some((_, sum)) => *sum += share,
-                    None => light.push((cluster - 1, share)),
-                }
-            }
+        for (of_column, &by) in of_columns[left..].iter().zip(widths) {
+            of_column.iter().for_each(|&(cluster, share)| here.add(cluster, by * share));
         }
+        here.take(&mut light);
         let voxel = row * columns + column;
         let weight = wish.weights.get(voxel).copied().unwrap_or(1.0);
         for &(cluster, share) in &light {
