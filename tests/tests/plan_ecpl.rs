@@ -273,6 +273,8 @@ fn lines_of_mirrors_are_lit_for_their_times() {
     let shown = "lamp plan simulate lines/lines.tif --model column --projector jariwala --material pegda-mw700";
     scratch.run(shown).succeeds();
     scratch.run("lamp target lines --projector jariwala -o whole").succeeds();
+    let cone = scratch.run("lamp target lines --projector zhao -o refused");
+    cone.is_refused_with(&["zhao", "spreads over a cone"]);
     for (options, words) in [
         ("--times 5s,2s", &["--times", "ascending order"][..]),
         ("--times 1ms", &["--times", "100 ms"]),

@@ -2,8 +2,8 @@
 
 use lamp_grayscale::calibrate::{Estimate, t_95};
 use lamp_grayscale::material::{Given, GivenRange, KineticNumbers, MeasuredRange};
-use lamp_grayscale::resin::{ExposureTime, Intensity, Kinetics, ModelError, Quantity};
-use lamp_stack::{Length, format_significant, named};
+use lamp_grayscale::resin::{Dose, ExposureTime, Intensity, Kinetics, ModelError, Quantity};
+use lamp_stack::{Length, format_significant, named, round_significant};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -252,12 +252,16 @@ pub fn fit_kinetics(
         KineticSize::Height { height, .. } => Some(height),
         KineticSize::Width(_) => None,
     });
-    let measured = MeasuredRange {
-        source: source.to_owned(),
-        doses: GivenRange::of(points.iter().map(KineticPoint::dose))
+    let measured =
+        MeasuredRange {
+            source: source.to_owned(),
+            // A product of light and time has more digits than either, and a range holds to nine.
+            doses: GivenRange::of(points.iter().map(|point| {
+                Dose::from_mj_per_cm2(round_significant(point.dose().mj_per_cm2(), 10))
+            }))
             .ok_or(KineticFitError::NothingShown)?,
-        depths: GivenRange::of(depths),
-    };
+            depths: GivenRange::of(depths),
+        };
     Ok(KineticFit {
         rates: shown.iter().zip(&halves).map(fitted).collect(),
         kept,

@@ -7,8 +7,8 @@ use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_grayscale::target::lines;
 use lamp_pipeline::documents::document;
-use lamp_planning::ecpl::LONGEST_MS;
-use lamp_planning::projector::Projector;
+use lamp_planning::ecpl::{LONGEST_MS, SettingError};
+use lamp_planning::projector::{Projector, SpreadOf};
 use lamp_stack::{Destination, Format, Length, write_stack};
 
 use super::squares::Doses;
@@ -62,6 +62,10 @@ pub(super) struct LinesArgs {
 
 pub(super) fn run(args: &LinesArgs, common: &Common) -> Result<(), Exit> {
     let projector: Projector = document(&args.projector)?;
+    if matches!(projector.spread(), SpreadOf::Cone(_)) {
+        let error = anyhow::Error::new(SettingError::Cone);
+        return Err(Exit::Failed(error).at(args.projector.display().to_string()));
+    }
     let light = projector.irradiance();
     let widths = sorted("--widths", &args.widths)?;
     let step_ms = projector.step.value.ms() * (1.0 - 1e-9);
