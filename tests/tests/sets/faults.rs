@@ -1,6 +1,7 @@
 //! Forms of a stack, and what is wrong with them.
 
 use std::fs;
+use std::path::Path;
 
 use lamp_tests::Scratch;
 
@@ -103,7 +104,12 @@ impl Form {
         let path = folder.path(self.name());
         let _ = fs::remove_file(&path);
         let _ = fs::remove_dir_all(&path);
-        folder.run(&format!("lamp {}", self.line("good.tif", self.name()))).succeeds_quietly();
+        // A form is written once, and copied for each command and fault.
+        let whole = format!("{}-{}", self.label(), self.name());
+        if !folder.path(&whole).exists() {
+            folder.run(&format!("lamp {}", self.line("good.tif", &whole))).succeeds_quietly();
+        }
+        copy(&folder.path(&whole), &path);
         match (self, fault) {
             (_, None) => {}
             (Self::Folder | Self::Pngs | Self::Strips | Self::Fields, Some(fault)) => {
@@ -170,6 +176,19 @@ impl Form {
                 fs::write(page(middle), bytes).unwrap();
             }
         }
+    }
+}
+
+/// Copies a file, or a folder of files.
+fn copy(from: &Path, to: &Path) {
+    if from.is_file() {
+        fs::copy(from, to).unwrap();
+        return;
+    }
+    fs::create_dir(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
     }
 }
 

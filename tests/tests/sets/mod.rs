@@ -150,10 +150,9 @@ fn cell(folder: &Scratch, line: &str, form: Form, whole: &[u8]) -> Result<char, 
 }
 
 /// Fills the line of the matrix for a command and a form.
-fn line_of(command: &str, form: Form) -> Result<String, String> {
-    let folder = scratch();
-    form.write(&folder, None);
-    let (status, said, whole) = outcome(&folder, command, form);
+fn line_of(folder: &Scratch, command: &str, form: Form) -> Result<String, String> {
+    form.write(folder, None);
+    let (status, said, whole) = outcome(folder, command, form);
     let place = format!("{:8} {command}", form.label());
     // A folder of strips or fields is no stack of layers, and only some commands take it for its
     // build.
@@ -167,8 +166,8 @@ fn line_of(command: &str, form: Form) -> Result<String, String> {
     let whole = whole.expect("a command that succeeds has an output");
     let mut cells = String::new();
     for &fault in form.faults() {
-        form.write(&folder, Some(fault));
-        let cell = cell(&folder, command, form, &whole);
+        form.write(folder, Some(fault));
+        let cell = cell(folder, command, form, &whole);
         cells.push(cell.map_err(|why| format!("{place}, {fault:?}: {why}"))?);
     }
     Ok(format!("{place:66} {cells}\n"))
@@ -184,8 +183,9 @@ fn no_set_is_wrong_in_silence() {
     thread::scope(|scope| {
         for _ in 0..thread::available_parallelism().map_or(2, usize::from) {
             scope.spawn(|| {
+                let folder = scratch();
                 while let Some(&(command, form)) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let line = line_of(command, form);
+                    let line = line_of(&folder, command, form);
                     let place = cases.iter().position(|case| *case == (command, form)).unwrap();
                     lines.lock().unwrap_or_else(PoisonError::into_inner)[place] = Some(line);
                 }
