@@ -29,11 +29,18 @@ pub enum TargetError {
     /// There are no gray levels or too many.
     #[error("the gray levels must be 1 to 20")]
     Levels,
-    /// Dots are too large for their cells, or cells for the display.
-    #[error(
-        "dots take a third of the way to the next one at most, and stand in two rows and columns at least"
-    )]
-    Dots,
+    /// Dots are near each other.
+    #[error("dots of {side} pixels need a period of {} pixels at least", 3 * side)]
+    NearDots {
+        /// The side of a dot.
+        side: u32,
+    },
+    /// Dots are far from each other.
+    #[error("a period of {period} pixels leaves room for fewer than two rows or columns of dots")]
+    FarDots {
+        /// The pixels from dot to dot.
+        period: u32,
+    },
     /// A length in pixels is zero or too large.
     #[error("{what} of {pixels} pixels: they have 1 to {most}")]
     Pixels {
@@ -342,36 +349,43 @@ pub fn gray_squares(levels: &[GrayLevel], side: u32, gap: u32) -> Result<GrayMas
     Ok(image)
 }
 
-/// Makes square dots all over a display of columns and rows, one in the middle of each cell of `period`
-/// pixels. The dots of the upper left quarter are twice as wide, so that the image looks different however
-/// it is turned or mirrored.
+/// Makes square dots all over a display of columns and rows, from border to border, `period` pixels or a
+/// little more from one to the next. The dots of the upper left quarter are twice as wide, so that the
+/// image looks different however it is turned or mirrored.
 ///
 /// # Errors
-/// Returns an error if a dot is not a third of its cell or less, or if fewer than two cells lie along a
-/// side.
+/// Returns an error if the period is below three sides, or if fewer than two dots are along a side.
 pub fn dots([columns, rows]: [u32; 2], side: u32, period: u32) -> Result<Mask, TargetError> {
     check_pixels("dots", side, MAX_TILE)?;
     check_pixels("displays", columns.max(rows), MAX_ROWS)?;
-    let cells = [columns, rows].map(|pixels| pixels / period.max(1));
-    if period < 3 * side || cells.contains(&0) || cells.contains(&1) {
-        return Err(TargetError::Dots);
+    if period < 3 * side {
+        return Err(TargetError::NearDots { side });
     }
-    let first = |pixels: u32, cells: u32| (pixels - cells * period) / 2 + (period - side) / 2;
-    let (left, top) = (first(columns, cells[0]), first(rows, cells[1]));
+    let first = |pixels: u32| -> Result<Vec<u32>, TargetError> {
+        let free = pixels.saturating_sub(side);
+        let steps = free / period;
+        let place = |step: u32| (u64::from(free) * u64::from(step) / u64::from(steps)) as u32;
+        if steps == 0 {
+            Err(TargetError::FarDots { period })
+        } else {
+            Ok((0..=steps).map(place).collect())
+        }
+    };
+    let (lefts, tops) = (first(columns)?, first(rows)?);
     let mut mask = MaskBuilder::new(columns);
-    mask.push_black(top);
-    for row in 0..cells[1] {
-        let edges = (0..cells[0]).flat_map(|column| {
-            let is_wide = 2 * row < cells[1] && 2 * column < cells[0];
-            let left = left + column * period;
+    let mut end = 0;
+    for (row, top) in tops.iter().enumerate() {
+        let edges = lefts.iter().enumerate().flat_map(|(column, &left)| {
+            let is_wide = 2 * row < tops.len() && 2 * column < lefts.len() - 1;
             [left, left + if is_wide { 2 * side } else { side }]
         });
-        let edges: Vec<u32> = edges.collect();
+        // A row ends where its last dot does.
+        let edges: Vec<u32> = edges.filter(|&edge| edge < columns).collect();
+        mask.push_black(top - end);
         for _ in 0..side {
-            mask.push_row(&edges).expect("dots lie within their cells");
+            mask.push_row(&edges).expect("dots are narrower than their period");
         }
-        let is_last = row + 1 == cells[1];
-        mask.push_black(if is_last { rows - top - row * period - side } else { period - side });
+        end = top + side;
     }
     Ok(mask.finish())
 }
@@ -404,6 +418,20 @@ mod tests {
         }
         assert_eq!(gray_squares(&[], 3, 2), Err(TargetError::Levels));
         assert!(gray_squares(&levels, 0, 2).is_err() && gray_squares(&levels, 3, 9999).is_err());
+    }
+
+    #[test]
+    fn dots_reach_from_border_to_border() {
+        let image = dots([33, 20], 2, 7).unwrap();
+        assert_eq!((image.width(), image.height()), (33, 20));
+        // Five columns at 0, 7, 15, 23 and 31, and three rows at 0, 9 and 18.
+        assert_eq!(image.row(1), [0, 4, 7, 11, 15, 17, 23, 25, 31]);
+        assert_eq!(image.row(10), image.row(0));
+        assert_eq!(image.row(19), [0, 2, 7, 9, 15, 17, 23, 25, 31]);
+        assert!(image.row(2).is_empty() && image.row(17).is_empty());
+        assert_eq!(dots([33, 20], 3, 8), Err(TargetError::NearDots { side: 3 }));
+        assert_eq!(dots([33, 20], 3, 18), Err(TargetError::FarDots { period: 18 }));
+        assert!(dots([33, 20], 0, 18).is_err() && dots([0, 20], 3, 18).is_err());
     }
 
     #[test]

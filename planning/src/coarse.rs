@@ -113,7 +113,7 @@ pub(crate) struct CoarseBlur<T> {
 pub(crate) struct CoarseRoom<T> {
     /// The image, with black around it.
     image: Vec<T>,
-    /// Rows of places, each with all pixels: what they see, and what they send back.
+    /// Rows of places, each with all pixels: the light that they see and send back.
     rows: Vec<T>,
     back: Vec<T>,
     /// A row of pixels with black around it, divided among the pixels of a step, and one such part of

@@ -80,9 +80,8 @@ fn camera(shown: &GrayPicture) -> GrayPicture {
     };
     let (across, down) = (along(96, columns, true), along(64, rows, false));
     let mut levels = Vec::new();
-    for y in 0..rows {
-        let of_row =
-            |column: usize| (0..64).map(|row| down[y][row] * lit(row, column)).sum::<f64>();
+    for down in &down {
+        let of_row = |column: usize| (0..64).map(|row| down[row] * lit(row, column)).sum::<f64>();
         let sums: Vec<f64> = (0..96).map(of_row).collect();
         for (x, taps) in across.iter().enumerate() {
             let light: f64 = taps.iter().zip(&sums).map(|(tap, sum)| tap * sum).sum();
@@ -142,13 +141,13 @@ fn a_picture_of_dots_gives_a_projector_its_light() {
     let sigma =
         serde_json::from_str::<Value>(&shown).unwrap()["projectors"][0]["sigma_um"].as_f64();
     assert!((sigma.unwrap() / (0.9 * 560.0 / 90.0) - 1.0).abs() < 5e-3, "{shown}");
-    // The light is half as bright at one side. Beyond the dots it stays as it is there.
+    // The light is half as bright at one side.
     let light =
         GrayPicture::read(BufReader::new(File::open(scratch.path("light.png")).unwrap())).unwrap();
     assert_eq!((light.columns, light.rows), (96, 64));
     let of = |column: usize| f64::from(light.levels[32 * 96 + column]) / 65535.0;
-    let wanted = |place: f64| (0.45 + 0.15 * place / 48.0) / (0.45 + 0.15 * 42.0 / 48.0);
-    for (column, place) in [(20, -27.5), (70, 22.5), (95, 42.0)] {
+    let wanted = |place: f64| (0.45 + 0.15 * place / 48.0) / (0.45 + 0.15 * 47.5 / 48.0);
+    for (column, place) in [(20, -27.5), (70, 22.5), (95, 47.5)] {
         assert!(
             (of(column) / wanted(place) - 1.0).abs() < 0.01,
             "{column}: {} for {}",
@@ -173,6 +172,11 @@ fn a_picture_of_dots_gives_a_projector_its_light() {
     refused(&other, &["dots.tif", "96 x 64 pixels", "1024 x 768 mirrors"]);
     let many = line.replace("dots.tif", "plan/bitmaps.tif");
     refused(&many, &["plan/bitmaps.tif", "images, but a picture shows one", "lamp split --layers"]);
-    misused("lamp target dots --projector small.toml --dot 10 --period 20", &["a third"]);
-    misused("lamp target dots --projector small.toml --dot 10", &["two rows"]);
+    misused(
+        "lamp target dots --projector small.toml --dot 10 --period 20",
+        &["dots of 10 pixels need a period of 30"],
+    );
+    misused("lamp target dots --projector small.toml --period 64", &["a period of 64", "two rows"]);
+    misused(&format!("{line} -o -"), &["name a file"]);
+    refused(&format!("{line} --pixel 5mm"), &["camera.png", "pixel must be"]);
 }

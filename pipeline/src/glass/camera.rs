@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::PathBuf;
 
 use lamp_grayscale::resin::ExposureTime;
-use lamp_planning::projector::{CameraFit, CameraPicture, Projector};
+use lamp_planning::projector::{CameraError, CameraFit, CameraPicture, Projector};
 use lamp_planning::target::GrayPicture;
 use lamp_planning::{MirrorSeconds, ShownBitmap};
 use lamp_stack::Length;
@@ -29,7 +29,7 @@ impl CameraSettings {
     /// Finds the light of a projector.
     ///
     /// # Errors
-    /// Returns an error if a file cannot be read, if the image is none of the display's, or if the picture does
+    /// Returns an error if a file cannot be read, if the image has another size than the display, or if the picture does
     /// not show its light.
     pub fn fit(&self, projector: &Projector) -> Result<CameraFit, Error> {
         let at_picture = |error: Error| error.at(self.picture.display().to_string());
@@ -50,6 +50,11 @@ impl CameraSettings {
         let on = ShownBitmap { image: image.clone(), time: ExposureTime::from_ms(1000.0) };
         let shown = MirrorSeconds::of(&[on], |level| projector.share(level));
         let camera = CameraPicture { picture: &picture, pixel: self.pixel, shown: &shown };
-        camera.fit(projector).map_err(|error| at_picture(of_work(error)))
+        camera.fit(projector).map_err(|error| match error {
+            CameraError::NothingShown | CameraError::Symmetric => {
+                of_work(error).at(self.shown.display().to_string())
+            }
+            _ => at_picture(of_work(error)),
+        })
     }
 }

@@ -4,6 +4,7 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use lamp_grayscale::calibrate::{Estimate, inverse, least_squares, t_95};
+use lamp_grayscale::resin::{ModelError, plausible};
 use lamp_stack::{Length, format_significant};
 use rayon::prelude::*;
 use thiserror::Error;
@@ -46,7 +47,40 @@ pub struct CameraFit {
     pub r2: f64,
     /// The pixels that were used.
     pub pixels: usize,
+    /// Reasons why the intervals may not hold.
+    pub doubts: Vec<CameraDoubt>,
     flat: FlatField,
+}
+
+/// A reason why intervals of a [`CameraFit`] may not hold.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CameraDoubt {
+    /// Neighboring pixels are off in the same direction: more than noise is left, by this share of white.
+    #[error(
+        "neighboring pixels are off alike, by {:.2}% of white: sigma may be wrong by more than its interval; \
+         check that levels are in proportion to the light, that the camera looks straight on, and that \
+         nothing glows",
+        100.0 * .0
+    )]
+    Shared(f64),
+    /// This share of the lit pixels has the brightest level of the picture.
+    #[error(
+        "{:.1}% of the lit pixels have one level, the brightest of the picture: if the camera shows no more, \
+         expose it for less time",
+        100.0 * .0
+    )]
+    Plateau(f64),
+    /// Dark pixels are cut off at zero.
+    #[error("dark pixels are cut off at zero: keep the camera's dark level in the picture")]
+    CutOff,
+    /// This share of the display is beyond the outermost mirrors that were on.
+    #[error(
+        "{:.0}% of the display is beyond the outermost mirrors that were on: there, the flat field is taken \
+         from the nearest ones",
+        100.0 * .0
+    )]
+    Unseen(f64),
 }
 
 /// The light of mirrors relative to the one in the middle: a polynomial of the second degree over the
@@ -84,13 +118,17 @@ pub enum CameraError {
     /// The camera was at its brightest level.
     #[error("{:.1}% of the lit pixels are at the camera's brightest level: expose the camera for less time", 100.0 * .0)]
     Saturated(f64),
+    /// No camera has such pixels.
+    #[error(transparent)]
+    Pixel(#[from] ModelError),
     /// The camera sees mirrors with too few pixels.
     #[error("the picture has {} pixels a mirror: take one with 1 at least", format_significant(*.0, 3))]
     Coarse(f64),
     /// The picture shows something else.
     #[error(
         "the picture does not show this image, straight on: the fit explains {:.1}% of its scatter; check \
-         --shown, and that levels are in proportion to the light",
+         that the image is the one that was shown, that all of it is in the picture, and that levels are in \
+         proportion to the light",
         100.0 * .0
     )]
     NoFit(f64),
@@ -112,8 +150,16 @@ const DARK: usize = 5;
 const MOST_PIXELS: usize = 1 << 16;
 /// The pixels along the longer side of the coarsest picture.
 const COARSE: usize = 64;
+/// The share of the lit pixels that may be at the brightest level.
+const MOST_SATURATED: f64 = 1e-3;
+/// The misfit that neighbors may share, as a share of white, and the share of a display beyond the
+/// outermost mirrors, without a doubt.
+const MOST_SHARED: f64 = 2e-3;
+const MOST_UNSEEN: f64 = 0.05;
 /// The share of the scatter that must be explained.
 const LEAST_R2: f64 = 0.8;
+/// Less light than this share of the brightest does not count where the display's middle is searched.
+const FAINT: f64 = 0.1;
 /// The turns that are tried at first, and how many of them are followed.
 const TURNS: u32 = 36;
 const BEST: usize = 6;
@@ -142,11 +188,12 @@ impl CameraPicture<'_> {
     /// # Errors
     /// Returns an error if the picture does not show the light of these mirrors.
     pub fn fit(&self, projector: &Projector) -> Result<CameraFit, CameraError> {
+        self.pixel.map_or(Ok(()), |pixel| plausible::SIDE.check("pixel", pixel))?;
         let shown = Shown::of(self.shown, projector)?;
         let picture = Picture::of(self.picture)?;
         let longest = picture.columns.max(picture.rows);
         let mut bin = (longest / COARSE).max(1).next_power_of_two();
-        let mut model = first_place(&picture.binned(bin), &shown, bin)?;
+        let mut model = first_place(&picture, &shown, bin)?;
         let (picture, shown) = loop {
             let (coarse, of_mirrors) =
                 (picture.binned(bin), shown.binned(model.mirrors_a_bin(bin)));
@@ -168,15 +215,15 @@ impl CameraPicture<'_> {
         model: &Model,
         projector: &Projector,
     ) -> Result<CameraFit, CameraError> {
-        let pixels_a_mirror = 1.0 / model.scale();
-        if pixels_a_mirror < 1.0 {
-            return Err(CameraError::Coarse(pixels_a_mirror));
-        }
         let left = view.squares(model);
         let r2 = 1.0 - left / view.scatter();
         let fits = r2 > LEAST_R2;
         if !fits {
             return Err(CameraError::NoFit(r2.max(0.0)));
+        }
+        let pixels_a_mirror = 1.0 / model.scale();
+        if pixels_a_mirror < 1.0 {
+            return Err(CameraError::Coarse(pixels_a_mirror));
         }
         let free = view.pixels.len() - NUMBERS;
         let covariance = inverse(view.normal(model).0).ok_or(CameraError::Vague)?;
@@ -207,8 +254,36 @@ impl CameraPicture<'_> {
             misfit: (left / view.pixels.len() as f64).sqrt() / white,
             r2,
             pixels: view.pixels.len(),
+            doubts: self.doubts(view, model),
             flat: FlatField { modes: model.modes(), half: view.shown.half, lit: view.shown.lit() },
         })
+    }
+
+    /// Returns reasons why the intervals may not hold.
+    fn doubts(&self, view: &View<'_>, model: &Model) -> Vec<CameraDoubt> {
+        let mut doubts = Vec::new();
+        let white = model.modes()[0];
+        let shared = view.shared(model) / white;
+        if shared > MOST_SHARED {
+            doubts.push(CameraDoubt::Shared(shared));
+        }
+        let plateau = view.picture.plateau();
+        if plateau > MOST_SATURATED {
+            doubts.push(CameraDoubt::Plateau(plateau));
+        }
+        // With noise around a dark level of zero, half of the pixels would be below.
+        let edge = view.picture.border_levels();
+        let zeros = edge.iter().filter(|level| **level == 0.0).count() as f64 / edge.len() as f64;
+        if (0.2..0.95).contains(&zeros) {
+            doubts.push(CameraDoubt::CutOff);
+        }
+        let [lit, half] = [view.shown.lit(), view.shown.half];
+        let unseen =
+            1.0 - (0..2).map(|axis| ((lit[axis] + 0.5) / half[axis]).min(1.0)).product::<f64>();
+        if unseen > MOST_UNSEEN {
+            doubts.push(CameraDoubt::Unseen(unseen));
+        }
+        doubts
     }
 }
 
@@ -362,9 +437,14 @@ impl Picture {
         if brightest <= dark || lit == 0 {
             return Err(CameraError::NoLight);
         }
-        let at_most = picture.levels.iter().filter(|level| **level == u16::MAX).count();
-        let saturated = at_most as f64 / lit as f64;
-        if saturated > 1e-3 {
+        // A single pixel at its brightest is a hot one: light is as wide as its neighbors.
+        let is_brightest = |at: usize| picture.levels[at] == u16::MAX;
+        let has_neighbor = |at: &usize| {
+            let is_in_row = !(at + 1).is_multiple_of(columns);
+            is_in_row && is_brightest(at + 1) && is_brightest(*at)
+        };
+        let saturated = (0..picture.levels.len()).filter(has_neighbor).count() as f64 / lit as f64;
+        if saturated > MOST_SATURATED {
             return Err(CameraError::Saturated(saturated));
         }
         let edge = this.border_levels();
@@ -374,6 +454,24 @@ impl Picture {
             return Err(CameraError::LitBorder);
         }
         Ok(this)
+    }
+
+    /// Returns the share of the lit pixels that have the brightest level, if they are far more than have
+    /// one of the three levels below: where noise is as wide as levels, they are not.
+    fn plateau(&self) -> f64 {
+        let brightest = self.levels.iter().copied().fold(0.0, f64::max);
+        let dark = self.border().0;
+        let mut bright: Vec<f64> = self
+            .levels
+            .iter()
+            .copied()
+            .filter(|level| level - dark > 0.5 * (brightest - dark))
+            .collect();
+        bright.sort_by(|a, b| b.total_cmp(a));
+        let groups: Vec<usize> = bright.chunk_by(|a, b| a == b).map(<[f64]>::len).take(4).collect();
+        let [most, next @ ..] = &groups[..] else { return 0.0 };
+        let is_cut = *most > 10 * next.iter().sum::<usize>();
+        if is_cut { *most as f64 / bright.len() as f64 } else { 0.0 }
     }
 
     fn border_levels(&self) -> Vec<f64> {
@@ -475,6 +573,24 @@ impl<'a> View<'a> {
         let levels = || self.pixels.iter().map(|&at| self.picture.levels[at]);
         let mean = levels().sum::<f64>() / self.pixels.len() as f64;
         levels().map(|level| (level - mean).powi(2)).sum()
+    }
+
+    /// Returns the root mean square of the part of residuals that a pixel shares with its right neighbor:
+    /// noise has none, wrong models have.
+    fn shared(&self, model: &Model) -> f64 {
+        let table = self.table(model);
+        let columns = self.picture.columns;
+        let pairs = self.pixels.par_iter().filter(|at| !(*at + 1).is_multiple_of(columns));
+        let products = pairs.map(|&at| {
+            let [one, next] = [at, at + 1].map(|at| self.pixel(model, &table, at).0);
+            one * next
+        });
+        let products: Vec<f64> = products.collect();
+        let (count, sum) = (products.len() as f64, products.iter().sum::<f64>());
+        let squares: f64 = products.iter().map(|product| product * product).sum();
+        // Products of noise have a mean of zero, to four of its deviations.
+        let is_noise = sum < 4.0 * squares.sqrt();
+        if is_noise { 0.0 } else { (sum / count).sqrt() }
     }
 
     /// Returns the residual of a pixel, and the slopes of its level over the numbers.
@@ -672,16 +788,20 @@ impl BellTable {
     }
 }
 
-/// Returns where the display is in a coarse picture: the best of all turns, mirrored or not, with the
-/// middle and the size of the light.
+/// Returns where the display is in a picture, by squares of `bin` pixels: the best of all turns, mirrored
+/// or not, with the middle and the size of the light.
 fn first_place(picture: &Picture, shown: &Shown, bin: usize) -> Result<Model, CameraError> {
     let (dark, noise) = picture.border();
-    let floor = dark + 4.0 * noise;
-    let lights = picture.levels.iter().map(|level| (level - floor).max(0.0));
+    let brightest = picture.levels.iter().copied().fold(0.0, f64::max);
+    // Where there is light, and not how much: a flat field that is brighter at one side moves no middle.
+    let floor = dark + (4.0 * noise).max(FAINT * (brightest - dark));
+    let has_light = |light: f64, floor: f64| f64::from(u8::from(light > floor));
+    let lights = picture.levels.iter().map(|&level| has_light(level, floor));
     let lit = Extent::of((0..).zip(lights).map(|(at, light)| (picture.place(at), light)));
-    let of_shown = (0..).zip(&shown.shares).map(|(at, &share)| (shown.place(at), share));
+    let of_shown =
+        (0..).zip(&shown.shares).map(|(at, &share)| (shown.place(at), has_light(share, FAINT)));
     let on = Extent::of(of_shown);
-    let scale = on.size / lit.size / bin as f64;
+    let scale = on.size / lit.size;
     if !scale.is_finite() {
         return Err(CameraError::NoLight);
     }
@@ -691,20 +811,20 @@ fn first_place(picture: &Picture, shown: &Shown, bin: usize) -> Result<Model, Ca
         numbers[SIGMA] = (scale * bin as f64).ln();
         // The middles of both lie on each other.
         let model = Model { numbers, is_mirrored };
-        let middle = lit.middle.map(|at| at * bin as f64);
         let (sin, cos) = model.numbers[TURN].sin_cos();
         let [x, y] = on.middle.map(|at| at / scale);
         let (x, y) = (cos * x - sin * y, cos * y + sin * x);
         let x = if is_mirrored { -x } else { x };
-        (numbers[0], numbers[1]) = (middle[0] - x, middle[1] - y);
+        (numbers[0], numbers[1]) = (lit.middle[0] - x, lit.middle[1] - y);
         Model { numbers, is_mirrored }
     };
     let coarse = shown.binned(((scale * bin as f64).round() as usize).max(1));
     if coarse.is_symmetric() {
         return Err(CameraError::Symmetric);
     }
-    let view = View::new(picture, &coarse);
-    let turns = (0..TURNS).map(|k| 360.0 * k as f64 / TURNS as f64);
+    let picture = picture.binned(bin);
+    let view = View::new(&picture, &coarse);
+    let turns = (0..TURNS).map(|k| 360.0 * f64::from(k) / f64::from(TURNS));
     let starts = turns.flat_map(|turn| [start(false, turn), start(true, turn)]);
     let mut starts: Vec<_> = starts.map(|start| view.lit(start)).collect();
     starts.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -713,7 +833,7 @@ fn first_place(picture: &Picture, shown: &Shown, bin: usize) -> Result<Model, Ca
     best.ok_or(CameraError::NoLight)
 }
 
-/// The middle of some light, and how far it is spread out.
+/// The middle of some light, and its size.
 struct Extent {
     middle: [f64; 2],
     /// The root mean square of the distances from the middle.
@@ -937,8 +1057,26 @@ mod tests {
         let at = |x: f64, y: f64| dot(&TRUTH.modes, &modes([x, y], [20.0, 15.0]));
         let ratio = at(-12.5, 6.5) / at(5.5, -3.5);
         assert!((of(7, 21) / of(25, 11) / ratio - 1.0).abs() < 2e-3);
-        // The corner is farther from the middle than any dot.
-        assert_eq!(of(0, 0), of(3, 6));
+        let ratio = at(-19.5, -14.5) / at(5.5, -3.5);
+        assert!((of(0, 0) / of(25, 11) / ratio - 1.0).abs() < 2e-3);
+        // A square in the middle shows nothing of the corners: the light stays as it is at its edge.
+        let mut square = lamp_stack::MaskBuilder::new(40);
+        square.push_black(6);
+        (0..12).for_each(|_| square.push_row(&[11, 29]).unwrap());
+        (0..6).for_each(|_| square.push_row(&[11, 16]).unwrap());
+        square.push_black(6);
+        let square = shown(square.finish());
+        let picture = TRUTH.picture(&square, 1.0, 1);
+        let fit = CameraPicture { picture: &picture, pixel: None, shown: &square };
+        let fit = fit.fit(&projector()).unwrap();
+        assert!(
+            fit.doubts
+                .iter()
+                .any(|it| matches!(it, CameraDoubt::Unseen(share) if (0.6..0.8).contains(share))),
+            "{fit:?}"
+        );
+        let levels = fit.flat_field().levels;
+        assert_eq!((levels[0], levels[1]), (levels[6 * 40 + 11], levels[6 * 40 + 11]));
     }
 
     #[test]
@@ -966,12 +1104,12 @@ mod tests {
             "{noise}"
         );
         let bright = with(&|picture| {
-            picture.levels.iter_mut().for_each(|level| *level = level.saturating_mul(3));
+            picture.levels.iter_mut().for_each(|level| *level = level.saturating_mul(5));
         });
         assert!(matches!(bright, CameraError::Saturated(share) if share > 0.1), "{bright}");
         let cut = with(&|picture| {
-            picture.levels.drain(..110 * 20);
-            picture.rows -= 20;
+            picture.levels.drain(..110 * 32);
+            picture.rows -= 32;
         });
         assert_eq!(cut, CameraError::LitBorder);
         let other =
@@ -988,5 +1126,41 @@ mod tests {
         let few =
             Truth { pixels_a_mirror: 0.8, columns: 50, rows: 40, middle: [25.0, 20.0], ..TRUTH };
         assert!(matches!(few.fit(1), Err(CameraError::Coarse(_))));
+    }
+
+    #[test]
+    fn pictures_that_show_more_than_light_are_doubted() {
+        // Dots as small as light spreads look like wider light on another scale of levels.
+        let shown = shown(dots([40, 30], 4, 12).unwrap());
+        let truth = Truth { noise: 0.01, columns: 140, rows: 110, middle: [70.3, 55.1], ..TRUTH };
+        let picture = truth.picture(&shown, 1.0, 1);
+        let doubts = |change: &dyn Fn(f64) -> f64| {
+            let level =
+                |level: &u16| (change(f64::from(*level) / 65535.0) * 65535.0).round() as u16;
+            let levels = picture.levels.iter().map(level).collect();
+            let picture = GrayPicture { levels, ..picture };
+            CameraPicture { picture: &picture, pixel: None, shown: &shown }
+                .fit(&projector())
+                .unwrap()
+                .doubts
+        };
+        assert_eq!(doubts(&|level| level), []);
+        // Pictures for screens have another scale of levels.
+        let screen = doubts(&|level| level.powf(1.0 / 2.2));
+        assert!(matches!(screen[..], [CameraDoubt::Shared(share)] if share > 0.01), "{screen:?}");
+        let full = doubts(&|level| level.min(0.3));
+        assert!(
+            full.iter().any(|it| matches!(it, CameraDoubt::Plateau(share) if *share > 0.05)),
+            "{full:?}"
+        );
+        let dark = doubts(&|level| (level - DARK_LEVEL).max(0.0));
+        assert!(dark.contains(&CameraDoubt::CutOff), "{dark:?}");
+        // Single hot pixels are neither light nor too much of it.
+        let mut hot = picture.clone();
+        (0..8).for_each(|k| hot.levels[k * 1511 + 700] = u16::MAX);
+        let camera = CameraPicture { picture: &hot, pixel: None, shown: &shown };
+        assert!(camera.fit(&projector()).is_ok());
+        let far = CameraPicture { pixel: Some(Length::from_mm(5.0)), ..camera }.fit(&projector());
+        assert!(matches!(far, Err(CameraError::Pixel(_))), "{far:?}");
     }
 }

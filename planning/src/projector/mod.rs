@@ -18,7 +18,7 @@ use lamp_grayscale::resin::{ExposureTime, Intensity, Power};
 use lamp_stack::{Length, nonempty_text};
 use serde::{Deserialize, Serialize};
 
-pub use camera::{CameraError, CameraFit, CameraPicture};
+pub use camera::{CameraDoubt, CameraError, CameraFit, CameraPicture};
 pub use file::ProjectorError;
 pub use lens::{Focus, Lens};
 

@@ -177,7 +177,7 @@ impl<T: Real> Problem<T> {
         of_light + doses.map(of_doses).sum::<f64>()
     }
 
-    /// Leaves out the layers below those with light whose doses cost nothing, however bright the light
+    /// Leaves out the layers below all light whose doses cost nothing, however bright the light
     /// is. `brightest` has the doses of the brightest light.
     pub(crate) fn leave_out_below(&mut self, brightest: &[T]) {
         let costs = |voxel: &usize| {

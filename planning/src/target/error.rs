@@ -39,7 +39,7 @@ pub enum TargetError {
     },
     /// A picture whose pixels are not heights.
     #[error(
-        "a height map has gray pixels of 16 or 8 bits: this has {colour:?} ones of {bits} bits"
+        "a picture with gray pixels of 16 or 8 bits is needed: this has {colour:?} ones of {bits} bits"
     )]
     NotGray {
         /// Bits of each color.

@@ -14,7 +14,7 @@ use crate::args::options::{Common, parse_thickness};
 use crate::exit::Exit;
 use crate::output::endings::{PNG, check_ending, parse_toml};
 use crate::output::json_report::ReportTo;
-use crate::streams::{check_beside, input_name, write_file};
+use crate::streams::{check_beside, input_name, is_stream, write_file};
 use crate::terminal::progress::Progress;
 
 /// Find how a projector's light spreads, and how bright each mirror is, in a picture of its light
@@ -88,6 +88,9 @@ pub(super) fn run(args: &ProjectorArgs, common: &Common) -> Result<(), Exit> {
         Ok((path, flat_field.to_png().with_context(|| path.display().to_string())?))
     });
     let progress = Progress::new("calibrate", common, true);
+    fit.doubts
+        .iter()
+        .for_each(|doubt| progress.warn(&format!("{}: {doubt}", args.picture.display())));
     // The picture first: where it cannot be written, no projector is left.
     for (path, bytes) in light.transpose()?.into_iter().chain(written.transpose()?) {
         write_file(path, |out| out.write_all(&bytes))?;
@@ -95,14 +98,14 @@ pub(super) fn run(args: &ProjectorArgs, common: &Common) -> Result<(), Exit> {
     }
     let mut fitted = EstimateTable::of_pixels(input_name(&args.picture), "projector", fit.pixels);
     fitted.r2("R^2", fit.r2);
-    fitted.number("distance of pixels", "% of white", 100.0 * fit.misfit);
+    fitted.number("RMS misfit", "% of white", 100.0 * fit.misfit);
     fitted.heads();
     fitted.estimate("sigma", &fit.sigma);
     if let Some(pitch) = &fit.pitch {
         fitted.estimate("pitch", pitch);
     }
     fitted.numbers("turned", "degrees", fit.turned_deg);
-    fitted.number("pixels of a mirror", "1", fit.pixels_a_mirror);
+    fitted.number("pixels across a mirror", "1", fit.pixels_a_mirror);
     fitted.number("dark", "% of white", 100.0 * fit.dark);
     let darkest = flat_field.levels.iter().copied().min().unwrap_or_default();
     fitted.number(
@@ -121,8 +124,11 @@ impl ProjectorArgs {
     fn check(&self) -> Result<(), Exit> {
         self.flat_field.as_deref().map_or(Ok(()), |path| check_ending(path, &PNG))?;
         // The outputs end differently, so none is written over another.
-        let outputs = self.output.iter().chain(&self.flat_field).chain(self.report.path());
-        for output in outputs {
+        let files = || self.output.iter().chain(&self.flat_field);
+        if files().any(|file| is_stream(file)) {
+            return Err(Exit::usage("the table goes to standard output: name a file"));
+        }
+        for output in files().chain(self.report.path()) {
             // The projector may be written over the one that it was made from.
             let is_projector = self.output.as_ref() == Some(output);
             let base = Some(&self.projector).filter(|_| !is_projector);
