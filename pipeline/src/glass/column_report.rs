@@ -134,8 +134,8 @@ impl ColumnCure {
                 100.0 * plan.excess(),
                 plan.best.relative_gap(),
                 match plan.best.price / plan.best.error {
-                    // A bound of as much as the error bounds nothing, and errors of heights are not convex,
-                    // so that there it is none.
+                    // A bound of as much as the error bounds nothing. Errors of heights are not convex, and
+                    // have no bound.
                     share
                         if self.options.dose_error > 0.0
                             && share < 1.0

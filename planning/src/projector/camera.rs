@@ -225,7 +225,8 @@ impl CameraPicture<'_> {
         if pixels_a_mirror < 1.0 {
             return Err(CameraError::Coarse(pixels_a_mirror));
         }
-        let free = view.pixels.len() - NUMBERS;
+        let free = view.pixels.len().checked_sub(NUMBERS).filter(|free| *free > 0);
+        let free = free.ok_or(CameraError::Vague)?;
         let covariance = inverse(view.normal(model).0).ok_or(CameraError::Vague)?;
         let times = t_95(free) * (left / free as f64).sqrt();
         let half = |of: usize| times * covariance[of][of].max(0.0).sqrt();
@@ -1121,6 +1122,15 @@ mod tests {
         square.push_black(11);
         let square = super::tests::shown(square.finish());
         assert_eq!(fit(&picture, &square), Err(CameraError::Symmetric));
+        // Whatever a picture of a few pixels shows, it is too little.
+        for side in 1..=3 {
+            let mut levels = vec![600; side * side];
+            levels[side * side / 2] = 30_000;
+            let tiny = GrayPicture { columns: side, rows: side, levels };
+            assert!(fit(&tiny, &shown).is_err(), "{side}");
+            let long = GrayPicture { columns: 999, rows: 1, levels: vec![600; 999] };
+            assert!(fit(&long, &shown).is_err());
+        }
         let none = MirrorSeconds { mirrors: [2, 2], seconds: vec![0.0; 4] };
         assert_eq!(fit(&picture, &none), Err(CameraError::NothingShown));
         let few =

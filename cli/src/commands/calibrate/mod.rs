@@ -32,10 +32,10 @@ use crate::terminal::progress::Progress;
 use estimate_table::EstimateTable;
 use lamp_plots::{self as plots, Plot, drawn};
 
-/// Fit a resin's parameters to measured cure depths, widths, lines or profiles
+/// Fit a resin's parameters to measurements, or a projector's to a picture of its light
 ///
-/// It prints each parameter with its 95% confidence interval, writes the parameters to a material
-/// file, and plots the fit with the measured points.
+/// It prints each parameter with its 95% confidence interval, writes the parameters to a material or a
+/// projector's file, and plots the fit of a resin with the measured points.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
