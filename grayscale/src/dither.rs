@@ -71,6 +71,7 @@ fn dither_layer(mut layer: Layer, method: DitherMethod) -> Result<Layer, DitherE
     if let Image::Gray(gray) = &*layer.image {
         layer.image = dither_image(gray, method, layer.info.index)?.into();
         let method = method.name().to_owned();
+        layer.info.forget_areas();
         layer.info.renew_record(|before| match before {
             Some(DitherRecord::Cells(cells)) => {
                 DitherRecord::Cells(CellsRecord { method: Some(method), ..cells })

@@ -20,7 +20,7 @@ use crate::wall_report::WallReport;
 use crate::words::{optional, words_of};
 
 /// Changes when the same settings and layers give other bytes.
-pub const CODE: u32 = 6;
+pub const CODE: u32 = 7;
 
 /// How edges move and images grow.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

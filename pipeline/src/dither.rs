@@ -14,7 +14,7 @@ use crate::watcher::{Remark, Watcher};
 use crate::words::{optional, text, words_of};
 
 /// Changes when the same settings and layers give other bytes.
-pub const CODE: u32 = 3;
+pub const CODE: u32 = 4;
 
 /// How dots are made.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -12,7 +12,7 @@ use lamp_slicing::{
     Bodies, Fill, FillDoubt, LayerHeights, LayerLevels, Part, Polished, Shading, SliceError,
     SliceOptions, Slices,
 };
-use lamp_stack::{Image, Layer, LayerImage, Length, PageInfo, Size};
+use lamp_stack::{Image, Layer, LayerImage, Length, PageInfo, Size, SliceRecord};
 use serde::Serialize;
 
 use crate::documents::{document_and_word, is_file, recorded_name};
@@ -32,7 +32,7 @@ use crate::watcher::{Importance, Remark, Watcher};
 use crate::words::option;
 
 /// Changes when the same settings and part give other bytes.
-pub const CODE: u32 = 7;
+pub const CODE: u32 = 8;
 
 /// A part, how it is sliced, and on what machine it is to be built.
 #[derive(Clone, Debug)]
@@ -391,10 +391,16 @@ impl Slicing<'_> {
                 }
                 see(&layer.info);
             }
-            if let (Some(levels), Image::Gray(shares)) = (&self.edge_levels, &*layer.image) {
-                let image = shares.with_levels(levels);
-                // A page without gray pixels has one bit.
-                layer.image = image.to_mask().map_or_else(|| image.into(), LayerImage::from);
+            let SliceSettings { antialias, gray, .. } = self.stage.settings;
+            if let (true, GrayRule::None, Image::Gray(shares)) = (antialias, gray, &*layer.image) {
+                if let Some(levels) = &self.edge_levels {
+                    let image = shares.with_levels(levels);
+                    // A page without gray pixels has one bit.
+                    layer.image = image.to_mask().map_or_else(|| image.into(), LayerImage::from);
+                } else {
+                    let record = SliceRecord { levels_are_areas: true, ..SliceRecord::default() };
+                    layer.info.set_slice_record(record);
+                }
             }
             // Last: reports point into the images of the part alone.
             if let Some(panel) = &self.panel {

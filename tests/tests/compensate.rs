@@ -86,6 +86,59 @@ fn gray_layers_shrink_by_their_outlines() {
     scratch.run(grow).is_refused_with(&["in.tif", "layer 0", "gray", "dither"]);
 }
 
+/// A square bar with its axis at (20, 20) mm, as an ASCII STL.
+fn square_bar(side_mm: f64, degrees: f64) -> String {
+    let (sin, cos) = f64::to_radians(degrees).sin_cos();
+    let corner = |k: usize, z: f64| {
+        let [x, y] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]][k % 4];
+        let [x, y] = [x, y].map(|at: f64| at * side_mm / 2.0);
+        format!("vertex {} {} {z}\n", 20.0 + x * cos - y * sin, 20.0 + x * sin + y * cos)
+    };
+    let facet = |corners: [(usize, f64); 3]| {
+        let corners = corners.map(|(k, z)| corner(k, z)).concat();
+        format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+    };
+    let sides = (0..4).flat_map(|k| {
+        [[(k, 0.0), (k + 1, 0.0), (k + 1, 1.0)], [(k, 0.0), (k + 1, 1.0), (k, 1.0)]].map(facet)
+    });
+    let ends = [[(0, 0.0), (2, 0.0), (1, 0.0)], [(0, 0.0), (3, 0.0), (2, 0.0)]]
+        .into_iter()
+        .chain([[(0, 1.0), (1, 1.0), (2, 1.0)], [(0, 1.0), (2, 1.0), (3, 1.0)]]);
+    let facets: String = sides.chain(ends.map(facet)).collect();
+    format!("solid bar\n{facets}endsolid bar\n")
+}
+
+/// The side in micrometers of a square of the area of a page's white, at 1500 dpi.
+fn side_um(image: &Image) -> f64 {
+    let runs = (0..image.height()).flat_map(|row| image.runs(row));
+    let area: f64 =
+        runs.map(|(start, end, level)| f64::from((end - start) * u32::from(level))).sum();
+    (area / 255.0).sqrt() * 25_400.0 / 1500.0
+}
+
+#[test]
+fn edges_of_antialiased_slices_move_to_the_places_of_the_part() {
+    let scratch = Scratch::new();
+    for degrees in [0.0, 18.4, 26.6, 45.0] {
+        scratch.write("bar.stl", square_bar(1.7, degrees).as_bytes());
+        let slice = "lamp slice bar.stl --dpi 1500 --thickness 1mm --margin 4 --antialias";
+        scratch.run(&format!("{slice} -o in.tif")).succeeds();
+        assert_eq!(scratch.layers("in.tif")[0].info.other["levels"], "areas");
+        scratch.run("lamp compensate in.tif --uniform 25um -o out.tif").succeeds_quietly();
+        let off_um = (side_um(&scratch.layers("out.tif")[0].image) - 1650.0) / 2.0;
+        assert!(off_um.abs() < 0.3, "{degrees}: {off_um}");
+        scratch.run("lamp compensate in.tif --shrinkage 2% -o large.tif").succeeds_quietly();
+        let off_um = (side_um(&scratch.layers("large.tif")[0].image) - 1700.0 / 0.98) / 2.0;
+        assert!(off_um.abs() < 0.3, "{degrees}: {off_um}");
+        // Such pages may grow, but not those that are gray by depth.
+        scratch.run("lamp compensate in.tif --uniform -25um -o out.tif").succeeds_quietly();
+        let corners_um2 = (4.0 - std::f64::consts::PI) * 25.0 * 25.0;
+        let grown = f64::sqrt(1750.0 * 1750.0 - corners_um2);
+        let off_um = (side_um(&scratch.layers("out.tif")[0].image) - grown) / 2.0;
+        assert!(off_um.abs() < 0.3, "{degrees}: {off_um}");
+    }
+}
+
 #[test]
 fn thin_walls_are_kept_and_told_of() {
     let scratch = Scratch::new();

@@ -9,6 +9,7 @@
 
 use super::edge_map::{Cut, EdgeMap, NearestPlace};
 use super::outline::Outline;
+use super::row_runs::Run;
 
 /// How far beyond the outline pixels may lie, in sides of pixels: their color and the mean line
 /// disagree by less.
@@ -46,6 +47,49 @@ pub(super) fn measure(
     by: impl Fn(usize, usize) -> f64,
     measured: MeasuredPixels,
 ) {
+    for_each_piece(outlines, by, measured, |piece| match piece {
+        OutlinePiece::Side(side, slack) => side.measure(map, measured, slack),
+        OutlinePiece::Corner(before, after) => measure_corner(map, before, after, measured),
+    });
+}
+
+/// Calls `each` with the columns of rows that are measured from outlines, in any order.
+pub(super) fn for_each_measured(
+    outlines: &[Outline],
+    measured: MeasuredPixels,
+    height: u32,
+    mut each: impl FnMut(u32, Run),
+) {
+    let mut show = |row: u32, _down: f64, columns: Run| each(row, columns);
+    for_each_piece(
+        outlines,
+        |_, _| 0.0,
+        measured,
+        |piece| match piece {
+            OutlinePiece::Side(side, slack) => {
+                side.for_each_row(measured, slack, height, &mut show);
+            }
+            OutlinePiece::Corner(before, after) => {
+                for_each_row_at_corner(before, after, measured, height, &mut show);
+            }
+        },
+    );
+}
+
+/// A piece of an outline to which pixels may be nearest.
+enum OutlinePiece<'a> {
+    /// A side, and by how much it is longer at its ends.
+    Side(&'a Side, [f64; 2]),
+    /// The corner between two sides.
+    Corner(&'a Side, &'a Side),
+}
+
+fn for_each_piece(
+    outlines: &[Outline],
+    by: impl Fn(usize, usize) -> f64,
+    measured: MeasuredPixels,
+    mut each: impl FnMut(OutlinePiece<'_>),
+) {
     for (of, outline) in outlines.iter().enumerate() {
         let count = outline.len();
         let side = |corner: usize| {
@@ -58,9 +102,9 @@ pub(super) fn measure(
         for corner in 0..count {
             let next = side((corner + 1) % count);
             let turns = CornerTurn::between(&here, &next, measured.reach);
-            here.measure(map, measured, [turned, turns].map(|turn| turn.slack(measured)));
+            each(OutlinePiece::Side(&here, [turned, turns].map(|turn| turn.slack(measured))));
             if turned == CornerTurn::Corner {
-                measure_corner(map, &before, &here, measured);
+                each(OutlinePiece::Corner(&before, &here));
             }
             (before, here, turned) = (here, next, turns);
         }
@@ -115,26 +159,48 @@ impl Side {
         Self { start, along: [x / length, y / length], length, by }
     }
 
-    /// Measures the pixels straight above the side.
-    /// At its ends there is room for turns.
-    fn measure(&self, map: &mut EdgeMap, measured: MeasuredPixels, slack: [f64; 2]) {
-        let MeasuredPixels { is_right, reach, pixel } = measured;
-        let beyond = measured.beyond();
+    /// Returns the direction to the measured pixels.
+    fn inwards(&self, measured: MeasuredPixels) -> [f64; 2] {
         let [x, y] = self.along;
         // Rows count down, so the right of (x, y) is (-y, x).
-        let inwards = if is_right { [-y, x] } else { [y, -x] };
+        if measured.is_right { [-y, x] } else { [y, -x] }
+    }
+
+    /// Calls `each` with the rows of pixels straight above the side: the row, the distance of its
+    /// middle below the side's start, and the columns. At its ends there is room for turns.
+    #[inline]
+    fn for_each_row(
+        &self,
+        measured: MeasuredPixels,
+        slack: [f64; 2],
+        height: u32,
+        mut each: impl FnMut(u32, f64, Run),
+    ) {
+        let MeasuredPixels { reach, pixel, .. } = measured;
+        let beyond = measured.beyond();
+        let inwards = self.inwards(measured);
         let ends = [-slack[0], self.length + slack[1]];
         let corners = [(ends[0], -beyond), (ends[1], -beyond), (ends[0], reach), (ends[1], reach)];
-        let rows = corners.map(|(along, away)| self.start[1] + along * y + away * inwards[1]);
-        let along = PixelStrip::new([x, y], ends);
+        let rows =
+            corners.map(|(along, away)| self.start[1] + along * self.along[1] + away * inwards[1]);
+        let along = PixelStrip::new(self.along, ends);
         let across = PixelStrip::new(inwards, [-beyond, reach]);
+        for row in rows_between(rows, pixel[1], height) {
+            let down = (f64::from(row) + 0.5) * pixel[1] - self.start[1];
+            let columns = along.in_row(down).and(across.in_row(down));
+            each(row, down, columns.pixels(self.start[0], pixel[0]));
+        }
+    }
+
+    /// Measures the pixels straight above the side.
+    fn measure(&self, map: &mut EdgeMap, measured: MeasuredPixels, slack: [f64; 2]) {
+        let pixel = measured.pixel;
+        let [x, y] = self.along;
+        let inwards = self.inwards(measured);
         let slope = (self.by[1] - self.by[0]) / self.length;
         let cut = Cut::new(inwards, pixel);
         let mut place = 0;
-        for row in rows_between(rows, pixel[1], map.height()) {
-            let down = (f64::from(row) + 0.5) * pixel[1] - self.start[1];
-            let columns = along.in_row(down).and(across.in_row(down));
-            let columns = columns.pixels(self.start[0], pixel[0]);
+        self.for_each_row(measured, slack, map.height(), |row, down, columns| {
             map.for_each_near(row, columns, &mut place, |column, near, level| {
                 let right = (f64::from(column) + 0.5) * pixel[0] - self.start[0];
                 let distance = right * inwards[0] + down * inwards[1];
@@ -145,28 +211,50 @@ impl Side {
                     *level = cut.level(*near);
                 }
             });
-        }
+        });
+    }
+}
+
+/// Returns the radius of the wedge between two sides whose pixels are measured, and the sign of
+/// their distances.
+fn wedge(before: &Side, after: &Side, measured: MeasuredPixels) -> (f64, f64) {
+    let turn = before.along[0] * after.along[1] - before.along[1] * after.along[0];
+    // A wedge beyond a corner that juts out of the measured pixels holds few of them.
+    let juts_out = (turn > 0.0) == measured.is_right;
+    if juts_out { (measured.beyond(), -1.0) } else { (measured.reach, 1.0) }
+}
+
+/// Calls `each` with the rows of pixels in the wedge between two sides: the row, the distance of its
+/// middle below the corner, and the columns.
+#[inline]
+fn for_each_row_at_corner(
+    before: &Side,
+    after: &Side,
+    measured: MeasuredPixels,
+    height: u32,
+    mut each: impl FnMut(u32, f64, Run),
+) {
+    let pixel = measured.pixel;
+    let (radius, _) = wedge(before, after, measured);
+    let past_before = PixelStrip::new(before.along, [-SLACK, f64::INFINITY]);
+    let short_of_after = PixelStrip::new(after.along, [f64::NEG_INFINITY, SLACK]);
+    let [x, y] = after.start;
+    for row in rows_between([y - radius, y + radius, y, y], pixel[1], height) {
+        let down = (f64::from(row) + 0.5) * pixel[1] - y;
+        let half = (radius * radius - down * down).max(0.0).sqrt();
+        let wedge = past_before.in_row(down).and(short_of_after.in_row(down));
+        each(row, down, wedge.and(Interval { low: -half, high: half }).pixels(x, pixel[0]));
     }
 }
 
 /// Measures the pixels in the wedge between two sides.
 fn measure_corner(map: &mut EdgeMap, before: &Side, after: &Side, measured: MeasuredPixels) {
-    let MeasuredPixels { is_right, reach, pixel } = measured;
-    let turn = before.along[0] * after.along[1] - before.along[1] * after.along[0];
-    // A wedge beyond a corner that juts out of the measured pixels holds few of them.
-    let juts_out = (turn > 0.0) == is_right;
-    let (radius, sign) = if juts_out { (measured.beyond(), -1.0) } else { (reach, 1.0) };
-    let past_before = PixelStrip::new(before.along, [-SLACK, f64::INFINITY]);
-    let short_of_after = PixelStrip::new(after.along, [f64::NEG_INFINITY, SLACK]);
-    let [x, y] = after.start;
+    let pixel = measured.pixel;
+    let (_, sign) = wedge(before, after, measured);
     let mut place = 0;
-    for row in rows_between([y - radius, y + radius, y, y], pixel[1], map.height()) {
-        let down = (f64::from(row) + 0.5) * pixel[1] - y;
-        let half = (radius * radius - down * down).max(0.0).sqrt();
-        let wedge = past_before.in_row(down).and(short_of_after.in_row(down));
-        let columns = wedge.and(Interval { low: -half, high: half }).pixels(x, pixel[0]);
+    for_each_row_at_corner(before, after, measured, map.height(), |row, down, columns| {
         map.for_each_near(row, columns, &mut place, |column, near, level| {
-            let right = (f64::from(column) + 0.5) * pixel[0] - x;
+            let right = (f64::from(column) + 0.5) * pixel[0] - after.start[0];
             let distance = right.hypot(down);
             // Straight above a side, the side knows better on which side of it a pixel is.
             if distance + 4.0 * SLACK < f64::from(near.distance.abs()) {
@@ -174,7 +262,7 @@ fn measure_corner(map: &mut EdgeMap, before: &Side, after: &Side, measured: Meas
                 *level = Cut::new([right / distance, down / distance], pixel).level(*near);
             }
         });
-    }
+    });
 }
 
 /// Returns the rows, each `pixel` high, whose middles lie between the least and the greatest of

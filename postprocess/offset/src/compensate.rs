@@ -1,5 +1,7 @@
 //! Compensation as a stage: layers enlarged for firing, then their edges moved.
 
+use std::borrow::Cow;
+
 use lamp_stack::{
     CompensateRecord, GrayMask, Image, Layer, Length, MAX_SIDE, Mask, NotSquare, Pitch, StackInfo,
     map_in_order,
@@ -8,9 +10,10 @@ use thiserror::Error;
 
 use super::components::{self, Loss};
 use super::scale::{Enlargement, scaled};
+use super::true_edges::TrueShape;
 use super::walls::ThinWall;
 use super::widths::Widths;
-use super::{offset_by_ellipse, shrink};
+use super::{offset_areas, offset_by_ellipse, shrink};
 
 /// Options of [`compensate`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,8 +70,8 @@ pub enum CompensateProblem {
     /// Its pixels are not square.
     #[error("cannot be compensated so: {0}")]
     NotSquare(NotSquare),
-    /// The layer is gray and should grow.
-    #[error("is gray, and only 1-bit layers can grow")]
+    /// The layer is gray by depth and should grow.
+    #[error("is gray by depth, and only 1-bit layers and layers of slice --antialias can grow")]
     GrayGrows,
     /// Edges would move further than any resin makes them.
     #[error("has edges that would move by {pixels:.0} pixels: {max} is the most")]
@@ -126,7 +129,8 @@ const WIDTH_UNIT: u64 = 32;
 /// under `compensate`; all others pass unchanged.
 ///
 /// In gray layers the edges of the exposed pixels move. Inside, levels stay: each pixel has the
-/// lower of its level and what is left of it.
+/// lower of its level and what is left of it. Levels that are areas
+/// ([`SliceRecord::levels_are_areas`](lamp_stack::SliceRecord)) instead show where the edges are.
 ///
 /// ```
 /// use lamp_offset::{CompensateError, CompensateOptions, Widths, compensate};
@@ -161,9 +165,10 @@ pub fn compensate<E: From<CompensateError> + Send>(
         let failed = |problem| CompensateError { layer: name.clone(), problem };
         let pitch = layer.pitch.ok_or_else(|| failed(CompensateProblem::NoResolution))?;
         let widths = widths(&layer, pitch)?;
-        let is_enlarged = enlarge(&mut layer, options.shrinkage).map_err(failed)?;
-        let moved = move_edges(&mut layer, &widths, &options, pitch).map_err(failed)?;
-        if !is_enlarged && moved.is_none() {
+        let enlarged = enlarge(&mut layer, options.shrinkage).map_err(failed)?;
+        let moved = move_edges(&mut layer, enlarged.as_ref(), &widths, &options, pitch);
+        let moved = moved.map_err(failed)?;
+        if enlarged.is_none() && moved.is_none() {
             return Ok((layer, None));
         }
         let moved = moved.unwrap_or_default();
@@ -217,10 +222,29 @@ fn inwards_um(widths: &Widths, pitch: Pitch) -> [f64; 2] {
     }
 }
 
-/// Enlarges a layer. Returns false if firing takes nothing away.
-fn enlarge(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensateProblem> {
+/// The enlargement of an image along its columns and rows, and the width of the larger one.
+struct LargerImage {
+    columns: Enlargement,
+    rows: Enlargement,
+    width: u32,
+}
+
+/// Returns a layer's image if its levels are shares of pixels' areas.
+fn areas_of(layer: &Layer) -> Option<&GrayMask> {
+    match &*layer.image {
+        Image::Gray(areas) if layer.info.slice_record().levels_are_areas => Some(areas),
+        _ => None,
+    }
+}
+
+/// Enlarges a layer, except for an image of areas, whose outlines are to be enlarged. Returns `None`
+/// if firing takes nothing away.
+fn enlarge(
+    layer: &mut Layer,
+    shrinkage: Shrinkage,
+) -> Result<Option<LargerImage>, CompensateProblem> {
     if shrinkage == Shrinkage::default() {
-        return Ok(false);
+        return Ok(None);
     }
     if layer.info.stack.as_ref().is_some_and(StackInfo::is_build) {
         return Err(CompensateProblem::Tiled);
@@ -231,7 +255,10 @@ fn enlarge(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensatePr
     if width.max(rows.after()) > MAX_SIDE.into() {
         return Err(CompensateProblem::TooLarge);
     }
-    layer.image = scaled(&layer.image, &columns, &rows, width as u32).into();
+    let larger = LargerImage { columns, rows, width: width as u32 };
+    if areas_of(layer).is_none() {
+        layer.image = scaled(&layer.image, &columns, &rows, larger.width).into();
+    }
     let info = &mut layer.info;
     for listed in [&mut info.stray_rows, &mut info.open_rows] {
         listed.iter_mut().for_each(|row| *row = rows.first_past(*row) as u32);
@@ -240,7 +267,7 @@ fn enlarge(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensatePr
     if let Some([x, y]) = &mut info.origin_mm {
         (*x, *y) = (*x / (1.0 - shrinkage.x), *y / (1.0 - shrinkage.y));
     }
-    Ok(true)
+    Ok(Some(larger))
 }
 
 /// The findings to report of a layer whose edges moved.
@@ -255,11 +282,14 @@ struct MovedEdges {
 /// Moves the edges of a layer. Returns `None` if that changes nothing.
 fn move_edges(
     layer: &mut Layer,
+    enlarged: Option<&LargerImage>,
     widths: &Widths,
     options: &CompensateOptions,
     pitch: Pitch,
 ) -> Result<Option<MovedEdges>, CompensateProblem> {
-    if widths.are_zero() || layer.image.change_count() == 0 {
+    let areas = areas_of(layer);
+    let changes_all = areas.is_some() && (enlarged.is_some() || options.one_bit);
+    if !changes_all && (widths.are_zero() || layer.image.change_count() == 0) {
         return Ok(None);
     }
     let [least, most] = widths.range();
@@ -287,6 +317,8 @@ fn move_edges(
         }
         return Err(CompensateProblem::TooDeep { pixels: depth, max: MAX_DEPTH });
     }
+    // Only one distance for all places may be below zero (`Widths`), or one for each axis.
+    let inwards = widths.ellipse().unwrap_or([least; 2]);
     let mut moved = MovedEdges::default();
     let mut shrunk = |mask: &Mask| {
         let (gray, walls) = match widths.ellipse() {
@@ -301,12 +333,34 @@ fn move_edges(
     };
     let gray = match &*layer.image {
         Image::Mask(mask) if least < 0.0 => {
-            // Only one distance for all places may be below zero (`Widths`), or one for each axis.
-            let inwards = widths.ellipse().unwrap_or([least; 2]);
             moved.cut_off = is_near_border(mask, inwards.map(|by| -by));
             offset_by_ellipse(mask, inwards)
         }
         Image::Mask(mask) => shrunk(mask),
+        Image::Gray(shares) if areas.is_some() => {
+            let (shape, shares) = match (TrueShape::of(shares), enlarged) {
+                (shape, Some(LargerImage { columns, rows, width })) => {
+                    let shape = shape.enlarged(columns, rows, *width);
+                    let shares = shape.shares();
+                    (shape, Cow::Owned(shares))
+                }
+                (shape, None) => (shape, Cow::Borrowed(shares)),
+            };
+            let (gray, walls) = if widths.are_zero() {
+                (shares.clone().into_owned(), Vec::new())
+            } else {
+                offset_areas(&shape, widths, min_feature)
+            };
+            if least < 0.0 {
+                moved.cut_off = is_near_border(&shape.all, inwards.map(|by| -by));
+            } else if min_feature == 0.0 {
+                moved.losses = components::losses(&shape.all, &gray.at_least(128));
+            }
+            moved.walls = walls;
+            // A wall that is kept has whole pixels: of gray ones, no more than they had.
+            let is_capped = least >= 0.0 && !options.one_bit;
+            if is_capped { components::lower(&shares, &gray) } else { gray }
+        }
         Image::Gray(_) if least < 0.0 => return Err(CompensateProblem::GrayGrows),
         Image::Gray(gray) => {
             let left = shrunk(&gray.at_least(1));
@@ -314,14 +368,20 @@ fn move_edges(
             components::lower(gray, &left)
         }
     };
-    let image = match &*layer.image {
-        Image::Mask(_) if options.one_bit => Image::Mask(gray.at_least(128)),
+    let has_depths = matches!(&*layer.image, Image::Gray(_)) && areas.is_none();
+    let image = if has_depths {
+        Image::Gray(gray)
+    } else if options.one_bit {
+        Image::Mask(gray.at_least(128))
+    } else {
         // Edges that moved by whole pixels leave no gray, and the layer stays 1-bit.
-        Image::Mask(_) => gray.to_mask().map_or_else(|| Image::Gray(gray), Image::Mask),
-        Image::Gray(_) => Image::Gray(gray),
+        gray.to_mask().map_or_else(|| Image::Gray(gray), Image::Mask)
     };
     if image == *layer.image && moved.walls.is_empty() && !moved.cut_off {
         return Ok(None);
+    }
+    if matches!(image, Image::Mask(_)) {
+        layer.info.forget_areas();
     }
     layer.image = image.into();
     Ok(Some(moved))

@@ -4,10 +4,10 @@
 use lamp_stack::{GrayMask, LevelChange};
 
 use super::aligned_rows::AlignedRows;
-use super::closest::{MeasuredPixels, measure};
+use super::closest::{MeasuredPixels, for_each_measured, measure};
 use super::erode::{Disc, DistanceSources, Erosion, SourceColour, at_least, more_than};
 use super::outline::Outline;
-use super::row_runs::{RowRuns, Run, first_past, subtract};
+use super::row_runs::{RowRuns, Run, first_past, join_runs, subtract};
 
 /// Edges, and by how many pixels they move away from the sources.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +37,8 @@ const MAX_DEPTH: f32 = 256.0;
 /// The most by which the distance from the nearest source, middle to middle, differs from the
 /// distance from the edge between.
 const STAIR: f64 = 2.0;
+/// The most by which the pixels of a shape are off from its outlines, also of one that is enlarged.
+const SHAPE_OFF: f64 = 1.5;
 /// Half of a pixel's diagonal: how far from the middle of a pixel an edge may be that cuts it.
 const HALF_DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
@@ -105,13 +107,7 @@ impl EdgeMap {
         axes: [f64; 2],
     ) -> Self {
         let by = axes[0].max(axes[1]);
-        // Stretched along the shorter axis, the ellipse is a disc. Distances there give levels, as
-        // stretching keeps shares of areas.
-        let pixel = axes.map(|axis| by / axis);
-        let stretch = |outline: &Outline| {
-            outline.iter().map(|point| [0, 1].map(|axis| point[axis] * pixel[axis])).collect()
-        };
-        let stretched: Vec<Outline> = outlines.iter().map(stretch).collect();
+        let (pixel, stretched) = stretched(outlines, axes);
         // A pixel that an edge cuts lies half a pixel from the ellipse around a place of the old
         // edge, and that lies near a source.
         let discs = [Disc::below(0, 0), Disc::ellipse(axes, STAIR + 1.0, region.height())];
@@ -121,6 +117,74 @@ impl EdgeMap {
         let is_right = sources.colour() == SourceColour::Black;
         let reach = by + pixel[0].hypot(pixel[1]);
         measure(&mut map, &stretched, |_, _| by, MeasuredPixels { is_right, reach, pixel });
+        map
+    }
+
+    /// Moves edges of a shape, inwards if `is_inwards`, whose outlines say exactly where they are:
+    /// pixels from `depth` further inside on are deep inside. Pixels outside have a share only within
+    /// `region`.
+    pub(super) fn around(
+        shape: &RowRuns,
+        region: &RowRuns,
+        edges: Edges<'_>,
+        depth: f64,
+        is_inwards: bool,
+    ) -> Self {
+        let most = edges.range[1];
+        let reach = most + f64::max(depth, SHAPE_OFF);
+        let measured = MeasuredPixels { is_right: is_inwards, reach, pixel: [1.0; 2] };
+        let by = |of: usize, corner: usize| edges.by.map_or(most, |by| by[of][corner]);
+        Self::measured_in(shape, region, edges.outlines, by, measured)
+    }
+
+    /// The same by an ellipse of half axes that are above zero.
+    pub(super) fn elliptic_around(
+        shape: &RowRuns,
+        region: &RowRuns,
+        outlines: &[Outline],
+        axes: [f64; 2],
+        is_inwards: bool,
+    ) -> Self {
+        let by = axes[0].max(axes[1]);
+        let (pixel, stretched) = stretched(outlines, axes);
+        let reach = by + pixel[0].hypot(pixel[1]);
+        let measured = MeasuredPixels { is_right: is_inwards, reach, pixel };
+        Self::measured_in(shape, region, &stretched, |_, _| by, measured)
+    }
+
+    /// Measures all pixels of a region that are near outlines. Other pixels of the shape are deep
+    /// inside.
+    fn measured_in(
+        shape: &RowRuns,
+        region: &RowRuns,
+        outlines: &[Outline],
+        by: impl Fn(usize, usize) -> f64,
+        measured: MeasuredPixels,
+    ) -> Self {
+        let height = shape.height();
+        let mut near: Vec<Vec<Run>> = vec![Vec::new(); height as usize];
+        for_each_measured(outlines, measured, height, |row, columns| {
+            if columns.0 < columns.1 {
+                near[row as usize].push(columns);
+            }
+        });
+        let mut map = Self { ends: vec![0], ..Self::default() };
+        let (mut far, mut runs) = (Vec::new(), Vec::new());
+        for (row, near) in (0..).zip(&mut near) {
+            join_runs(near);
+            let first = map.runs.len();
+            // The near pixels of the region: the region without its far ones.
+            subtract(region.row(row), near, &mut far);
+            subtract(region.row(row), &far, &mut runs);
+            runs.iter().for_each(|&run| map.push_near(run));
+            subtract(shape.row(row), near, &mut far);
+            map.runs.extend(far.iter().map(|&run| EdgeRun { columns: run, first: None }));
+            map.runs[first..].sort_unstable_by_key(|run| run.columns);
+            map.ends.push(map.runs.len());
+        }
+        map.near = vec![NearestPlace::FAR; map.near_count()];
+        map.levels = vec![255; map.near_count()];
+        measure(&mut map, outlines, by, measured);
         map
     }
 
@@ -280,6 +344,17 @@ impl EdgeMap {
         }
         push(end, level_outside);
     }
+}
+
+/// Stretches outlines so that an ellipse is a disc as wide as its longer axis. Returns the sides of a
+/// pixel there, too.
+fn stretched(outlines: &[Outline], axes: [f64; 2]) -> ([f64; 2], Vec<Outline>) {
+    // Distances there give levels, as stretching keeps shares of areas.
+    let pixel = axes.map(|axis| axes[0].max(axes[1]) / axis);
+    let stretch = |outline: &Outline| {
+        outline.iter().map(|point| [0, 1].map(|axis| point[axis] * pixel[axis])).collect()
+    };
+    (pixel, outlines.iter().map(stretch).collect())
 }
 
 /// Returns the pixels of the runs of a row that are near an edge.

@@ -117,7 +117,9 @@ proptest! {
     #[test]
     fn every_pixel_is_at_its_elliptic_distance(
         mask in masks(),
-        axes in [0.2..9.0f64, 0.2..9.0f64],
+        // The test takes the edge in a pixel to be straight. Stretched along a shorter axis, pixels
+        // would be wider than arcs around corners.
+        axes in [0.5..9.0f64, 0.5..9.0f64],
         grows: bool,
     ) {
         let sign = if grows { -1.0 } else { 1.0 };

@@ -32,6 +32,7 @@ mod scale;
 mod skeleton;
 mod straight;
 mod tolerance;
+mod true_edges;
 mod walls;
 mod wide;
 mod widths;
@@ -42,8 +43,10 @@ use edge_map::{EdgeMap, Edges};
 use erode::{DistanceSources, SourceColour};
 use feature_size::MovedOutlines;
 use grow::Reach;
+use outline::Outline;
 use row_runs::RowRuns;
 use skeleton::Cores;
+use true_edges::TrueShape;
 
 pub use compensate::{
     CompensateError, CompensateOptions, CompensateProblem, Compensated, Shrinkage, compensate,
@@ -111,14 +114,20 @@ pub fn offset_by_ellipse(mask: &Mask, [x, y]: [f64; 2]) -> GrayMask {
     if grows && x.max(y) > 0.0 {
         return GrayMask::from(mask);
     }
-    let by = x.abs().max(y.abs()).min(MAX_OFFSET);
-    let axes = [x, y].map(|axis| axis.abs().clamp(by * LEAST_AXIS, by));
     let (colour, level_outside) =
         if grows { (SourceColour::White, 255) } else { (SourceColour::Black, 0) };
     let outlines = outline::outlines(&RowRuns::white(mask));
     let sources = DistanceSources::new(mask, colour);
-    let edge = EdgeMap::elliptic(&sources, &region(mask, colour), mask.width(), &outlines, axes);
+    let (region, axes) = (region(mask, colour), axes_of([x, y]));
+    let edge = EdgeMap::elliptic(&sources, &region, mask.width(), &outlines, axes);
     edge.gray(mask.width(), level_outside)
+}
+
+/// Returns the half axes of the ellipse by which edges move.
+fn axes_of(inwards: [f64; 2]) -> [f64; 2] {
+    let [x, y] = inwards.map(f64::abs);
+    let by = x.max(y).min(MAX_OFFSET);
+    [x, y].map(|axis| axis.clamp(by * LEAST_AXIS, by))
 }
 
 /// Moves all edges of a mask inwards by `inwards` pixels, outwards if below zero, to the nearest
@@ -157,25 +166,69 @@ pub fn grow_one_bit(mask: &Mask, by: [f64; 2]) -> Mask {
 /// pixels near edges, as deep as edges move and half of `min_feature`.
 pub fn shrink(mask: &Mask, widths: &Widths, min_feature: f64) -> (GrayMask, Vec<ThinWall>) {
     let white = RowRuns::white(mask);
-    let outlines = outline::outlines(&white);
-    let moved = (!widths.are_uniform()).then(|| feature_size::moved(&white, &outlines, widths));
+    let sources = DistanceSources::new(mask, SourceColour::Black);
+    let map = |edges: Edges<'_>, depth: f64, all: bool| {
+        EdgeMap::new(&sources, &white, mask.width(), edges, depth, all)
+    };
+    shrunk(&white, mask.width(), &outline::outlines(&white), widths, min_feature, map)
+}
+
+/// Moves the edges of a shape as [`shrink`] and [`offset_by_ellipse`] do, from its outlines.
+fn offset_areas(shape: &TrueShape, widths: &Widths, min_feature: f64) -> (GrayMask, Vec<ThinWall>) {
+    let width = shape.mask.width();
+    let [mask, all] = [&shape.mask, &shape.all].map(RowRuns::white);
+    let [least, most] = widths.range();
+    if least < 0.0 {
+        let [black, all] = [&shape.mask, &shape.whole].map(|mask| RowRuns::white(&mask.inverted()));
+        // Only one distance for all places may be below zero (`Widths`), or one for each axis.
+        let map = match widths.ellipse() {
+            Some(inwards) => {
+                let axes = axes_of(inwards);
+                EdgeMap::elliptic_around(&black, &all, &shape.outlines, axes, false)
+            }
+            None => {
+                let by = -least;
+                let edges = Edges { outlines: &shape.outlines, by: None, range: [by, by] };
+                EdgeMap::around(&black, &all, edges, 0.0, false)
+            }
+        };
+        return (map.gray(width, 255), Vec::new());
+    }
+    if let Some(inwards) = widths.ellipse().filter(|_| most > 0.0) {
+        let axes = axes_of(inwards);
+        let map = EdgeMap::elliptic_around(&mask, &all, &shape.outlines, axes, true);
+        return (map.gray(width, 0), Vec::new());
+    }
+    let map = |edges: Edges<'_>, depth: f64, _| EdgeMap::around(&mask, &all, edges, depth, true);
+    shrunk(&mask, width, &shape.outlines, widths, min_feature, map)
+}
+
+/// Moves the edges of the shape `white` inwards, given its outlines and the `map` of its edges to a
+/// depth further inside.
+fn shrunk(
+    white: &RowRuns,
+    width: u32,
+    outlines: &[Outline],
+    widths: &Widths,
+    min_feature: f64,
+    map: impl Fn(Edges<'_>, f64, bool) -> EdgeMap,
+) -> (GrayMask, Vec<ThinWall>) {
+    let moved = (!widths.are_uniform()).then(|| feature_size::moved(white, outlines, widths));
     let edges = match &moved {
         Some(MovedOutlines { outlines, by, range }) => {
             Edges { outlines, by: Some(by), range: *range }
         }
-        None => Edges { outlines: &outlines, by: None, range: widths.range() },
+        None => Edges { outlines, by: None, range: widths.range() },
     };
-    let sources = DistanceSources::new(mask, SourceColour::Black);
     if min_feature <= 0.0 {
-        let edge = EdgeMap::new(&sources, &white, mask.width(), edges, 1.0, false);
-        return (edge.gray(mask.width(), 0), Vec::new());
+        return (map(edges, 1.0, false).gray(width, 0), Vec::new());
     }
     // Further inside, a wall is wide enough even after it has shrunk.
     let depth = f64::max(1.0, 0.5 + min_feature / 2.0);
-    let mut edge = EdgeMap::new(&sources, &white, mask.width(), edges, depth, true);
+    let mut edge = map(edges, depth, true);
     let cores = Cores::of(&edge, edges.range[1] + depth);
     let walls = cores.keep(&mut edge, min_feature);
-    (components::without_specks(edge.gray(mask.width(), 0)), walls)
+    (components::without_specks(edge.gray(width, 0)), walls)
 }
 
 /// Returns the pixels of the image that are no sources.
@@ -194,3 +247,5 @@ mod ellipse_tests;
 mod offset_tests;
 #[cfg(test)]
 mod size_tests;
+#[cfg(test)]
+mod true_edges_tests;

@@ -160,18 +160,18 @@ impl ParabolicArc {
     }
 }
 
-fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+pub(super) fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+pub(super) fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+pub(super) fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-fn plus(a: [f64; 2], b: [f64; 2], times: f64) -> [f64; 2] {
+pub(super) fn plus(a: [f64; 2], b: [f64; 2], times: f64) -> [f64; 2] {
     [a[0] + times * b[0], a[1] + times * b[1]]
 }

@@ -25,6 +25,11 @@ impl Enlargement {
         (f64::from(before) / self.left - 0.5).ceil().max(0.0) as u64
     }
 
+    /// Returns where a place of the image before lies in the larger one, in pixels.
+    pub(super) fn place(&self, before: f64) -> f64 {
+        before / self.left
+    }
+
     /// Returns the pixels of the larger image.
     pub(super) fn after(&self) -> u64 {
         self.first_past(self.before)

@@ -88,7 +88,7 @@ impl Across {
                     None => sum += 255.0,
                 }
             }
-            sides += f64::from(last.distance.max(0.0));
+            sides += f64::from(last.distance);
             moved += f64::from(last.by);
         }
         let width = sides.max(0.5);

@@ -134,9 +134,12 @@ mod tests {
         let mut page = PageInfo::default();
         page.set_slice_record(SliceRecord::default());
         assert_eq!(page.other, Map::new());
-        page.set_slice_record(SliceRecord { short_px: Some(9), is_fallback: false });
+        page.set_slice_record(SliceRecord { short_px: Some(9), ..SliceRecord::default() });
         page.set_slice_record(SliceRecord { is_fallback: true, ..page.slice_record() });
         assert_eq!(text(&page), r#"{"short_px":9,"fallback":true}"#);
-        assert_eq!(page.slice_record(), SliceRecord { short_px: Some(9), is_fallback: true });
+        page.set_slice_record(SliceRecord { levels_are_areas: true, ..SliceRecord::default() });
+        assert_eq!(text(&page), r#"{"short_px":9,"fallback":true,"levels":"areas"}"#);
+        let all = SliceRecord { short_px: Some(9), is_fallback: true, levels_are_areas: true };
+        assert_eq!(page.slice_record(), all);
     }
 }
