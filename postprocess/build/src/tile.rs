@@ -15,7 +15,7 @@ use crate::build_page::StrayRows;
 use crate::compose::{ComposeError, PlacedImage, compose};
 use crate::layout::Layout;
 use crate::lockstep::{HeightOptions, LayerSet, Lockstep};
-use crate::mesh::{BuildMesh, KeptMesh, MeshRows, on_base};
+use crate::mesh::{BuildMesh, KeptMesh, LayerMesh, on_base};
 use crate::pack::Pack;
 use crate::part_stack::PartStack;
 use crate::recipe::LoosePieces;
@@ -87,9 +87,7 @@ pub(crate) struct MeshedStep {
     pub(crate) set: LayerSet,
     /// The images of parts that have a layer here.
     pub(crate) images: Vec<(usize, Image)>,
-    pub(crate) mesh: Option<MeshRows>,
-    /// The pixels of the mesh, if they are wanted.
-    pub(crate) mesh_px: u64,
+    pub(crate) mesh: Option<Arc<LayerMesh>>,
     /// The pieces of mesh that hang on nothing, if they differ from the pieces in the layer below.
     pub(crate) loose: Option<LoosePieces>,
     /// Whether it is the build's first.
@@ -208,14 +206,13 @@ impl Layout {
                     // A layer below the range has only shaped the mesh of the layers above it.
                     Ok(_) if is_below => {}
                     Ok(made) => {
-                        let mesh_px = kept.as_mut().filter(|_| areas).map_or(0, KeptMesh::pixels);
                         let is_first = std::mem::take(&mut is_first);
                         let loose = kept.as_ref().filter(|kept| kept.loose() != known);
                         let loose = loose.map(|kept| {
                             known = kept.loose().to_vec();
                             LoosePieces { layer: made.set.index, starts: known.clone() }
                         });
-                        return Some(Ok(MeshedStep { is_first, loose, mesh_px, ..made }));
+                        return Some(Ok(MeshedStep { is_first, loose, ..made }));
                     }
                     Err(error) => return Some(Err(error.into())),
                 }
@@ -225,9 +222,10 @@ impl Layout {
             let layer = layout.layer(&step, images)?;
             let mut found: Vec<BuildFinding> =
                 layout.stray_rows(&step.set).into_iter().map(BuildFinding::Stray).collect();
-            let of_layer = Areas::new(layout.parts.len(), &step.images, step.mesh_px);
+            let mesh_px = step.mesh.as_ref().filter(|_| areas).map_or(0, |mesh| mesh.pixels());
+            let of_layer = Areas::new(layout.parts.len(), &step.images, mesh_px);
             found.extend(step.loose.map(BuildFinding::Loose));
-            if step.mesh.is_some_and(|mesh| mesh.is_black()) {
+            if step.mesh.is_some_and(|mesh| mesh.rows().is_black()) {
                 let index = layer.info.index.saturating_add(base_layers);
                 let info = PageInfo { index, ..layer.info.clone() };
                 found.push(BuildFinding::NoMesh(info.name()));
@@ -277,7 +275,7 @@ impl Layout {
             }
             _ => None,
         };
-        Ok(MeshedStep { set, images, mesh, mesh_px: 0, loose: None, is_first: false })
+        Ok(MeshedStep { set, images, mesh, loose: None, is_first: false })
     }
 
     /// Returns the placed images of the parts' layers at a height.
@@ -299,7 +297,8 @@ impl Layout {
     fn image(&self, step: &MeshedStep) -> Result<Image, TileError> {
         let placed =
             self.placed_images(&step.images).ok_or_else(|| self.too_many_runs(&step.set))?;
-        let composed = compose(&placed, self.pixels, step.mesh.as_ref());
+        let mesh = step.mesh.as_ref().map(|mesh| mesh.rows());
+        let composed = compose(&placed, self.pixels, mesh);
         composed.map_err(|fault| match fault {
             ComposeError::TooManyRuns => self.too_many_runs(&step.set),
             // The layout was checked by outlines, so a layer is white outside its outline.

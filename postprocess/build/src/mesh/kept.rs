@@ -1,5 +1,7 @@
 //! The mesh from layer to layer: rows around which no moat changes are kept.
 
+use std::sync::{Arc, OnceLock};
+
 use lamp_stack::{Image, Mask, Op, place_row};
 
 use super::super::compose::{PlacedImage, merge_rows};
@@ -19,11 +21,38 @@ pub(crate) struct KeptMesh {
     /// The walls that moats leave.
     cut: MeshRows,
     /// The pieces of these that hang together with the mesh below; none before the first layer.
-    hanging: Option<MeshRows>,
-    /// The number of their pixels, once it is counted.
-    pixels: Option<u64>,
+    hanging: Option<Arc<LayerMesh>>,
     /// The starts of pieces that are not small, but hang on nothing.
     loose: Vec<[u32; 2]>,
+}
+
+/// The mesh of a layer.
+///
+/// Where the mesh of each layer is inside the mesh of the layer below, no other layer needs its
+/// pieces. They are found when they are first asked for, so that each thread finds its own.
+pub(crate) struct LayerMesh {
+    /// The walls that moats leave, and the least number of pixels that a piece of them has.
+    cut: MeshRows,
+    least: u64,
+    hanging: OnceLock<Hanging>,
+    pixels: OnceLock<u64>,
+}
+
+impl LayerMesh {
+    /// Returns the rows of the pieces that hang on something and are not small.
+    pub(crate) fn rows(&self) -> &MeshRows {
+        &self.hanging().kept
+    }
+
+    /// Returns the number of pixels of these pieces.
+    pub(crate) fn pixels(&self) -> u64 {
+        let Hanging { kept, pixels, .. } = self.hanging();
+        *self.pixels.get_or_init(|| pixels.unwrap_or_else(|| kept.white_pixels()))
+    }
+
+    fn hanging(&self) -> &Hanging {
+        self.hanging.get_or_init(|| hanging_pieces(&self.cut, Holds::All, self.least))
+    }
 }
 
 impl KeptMesh {
@@ -41,14 +70,7 @@ impl KeptMesh {
         };
         let followed: Vec<Mask> = layout.parts.iter().map(black).collect();
         let moats = followed.iter().enumerate().map(moat).collect();
-        Self {
-            followed,
-            moats,
-            cut: mesh.standing.clone(),
-            hanging: None,
-            pixels: None,
-            loose: Vec::new(),
-        }
+        Self { followed, moats, cut: mesh.standing.clone(), hanging: None, loose: Vec::new() }
     }
 
     /// Returns the mesh around the parts' `images` in the next layer, or `None` if a moat has too
@@ -58,7 +80,7 @@ impl KeptMesh {
         mesh: &BuildMesh,
         layout: &Layout,
         images: &[(usize, Image)],
-    ) -> Option<MeshRows> {
+    ) -> Option<Arc<LayerMesh>> {
         let followed = |part| self.followed(mesh, layout, part, images);
         let followed = (0..layout.parts.len()).map(followed).collect::<Option<Vec<_>>>()?;
         let changed = self.cut_moats(mesh, layout, followed)?;
@@ -67,12 +89,11 @@ impl KeptMesh {
         if !changed && let Some(hanging) = &self.hanging {
             return Some(hanging.clone());
         }
-        let holds = match &self.hanging {
-            Some(below) if mesh.moat == Moat::Layer => Holds::Below(below),
-            // Other moats only grow, so the mesh is inside the mesh of the layer below.
-            _ => Holds::All,
-        };
-        Some(self.keep(hanging_pieces(&self.cut, holds, mesh.least_piece)))
+        let below = self.hanging.as_ref().filter(|_| mesh.moat == Moat::Layer);
+        // Other moats only grow, so the mesh is inside the mesh of the layer below.
+        let holds = below.map(|below| Holds::Below(below.rows()));
+        let found = holds.map(|holds| hanging_pieces(&self.cut, holds, mesh.least_piece));
+        Some(self.keep(mesh, found))
     }
 
     /// Returns the mesh of any layer, given the pixels that each part's moat follows in it, and the
@@ -84,12 +105,13 @@ impl KeptMesh {
         layout: &Layout,
         followed: Vec<Mask>,
         loose: &[[u32; 2]],
-    ) -> Option<MeshRows> {
+    ) -> Option<Arc<LayerMesh>> {
         let changed = self.cut_moats(mesh, layout, followed)?;
         if !changed && let Some(hanging) = self.hanging.as_ref().filter(|_| self.loose == loose) {
             return Some(hanging.clone());
         }
-        Some(self.keep(hanging_pieces(&self.cut, Holds::AllBut(loose), mesh.least_piece)))
+        let found = hanging_pieces(&self.cut, Holds::AllBut(loose), mesh.least_piece);
+        Some(self.keep(mesh, Some(found)))
     }
 
     /// Returns the starts of pieces of the layer's mesh that are not small, but hang on nothing.
@@ -97,17 +119,17 @@ impl KeptMesh {
         &self.loose
     }
 
-    /// Returns the number of pixels of the mesh in the layer that was made last.
-    pub(crate) fn pixels(&mut self) -> u64 {
-        let Self { hanging, pixels, .. } = self;
-        *pixels.get_or_insert_with(|| hanging.as_ref().map_or(0, MeshRows::white_pixels))
-    }
-
-    fn keep(&mut self, Hanging { kept, pixels, loose }: Hanging) -> MeshRows {
-        self.hanging = Some(kept.clone());
-        self.pixels = pixels;
-        self.loose = loose;
-        kept
+    /// Keeps the mesh of a layer, whose pieces may be found already.
+    fn keep(&mut self, mesh: &BuildMesh, found: Option<Hanging>) -> Arc<LayerMesh> {
+        self.loose = found.as_ref().map_or_else(Vec::new, |found| found.loose.clone());
+        let made = Arc::new(LayerMesh {
+            cut: self.cut.clone(),
+            least: mesh.least_piece,
+            hanging: found.map_or_else(OnceLock::new, OnceLock::from),
+            pixels: OnceLock::new(),
+        });
+        self.hanging = Some(made.clone());
+        made
     }
 
     /// Makes moats around the pixels that they follow now. Returns whether any has changed, or

@@ -22,6 +22,6 @@ mod with_mesh;
 
 pub(super) use base_layers::{base_page, on_base};
 pub(super) use build_mesh::BuildMesh;
-pub(super) use kept::KeptMesh;
+pub(super) use kept::{KeptMesh, LayerMesh};
 pub use mesh_options::{CellShape, MeshOptions, MeshPattern, Moat};
 pub(super) use mesh_rows::{MeshRows, inlaid};

@@ -9,7 +9,7 @@ use std::sync::{Arc, OnceLock};
 use lamp_stack::{Image, Layer, Mask, MemorySize, PageInfo, StackInfo, map_in_order};
 
 use super::super::lockstep::LayerSet;
-use super::super::mesh::{BuildMesh, KeptMesh, MeshRows, base_page};
+use super::super::mesh::{BuildMesh, KeptMesh, LayerMesh, base_page};
 use super::super::part_stack::white_of;
 use super::super::tile::MeshedStep;
 use super::super::{CopyPlacement, Layout, Moat, PartStack, TileError};
@@ -230,7 +230,7 @@ impl Composer {
         let set = set.with_layers(layers, &self.copies, mesh_bytes);
         let images = self.canvas.layout.framed(&set, false)?;
         let mesh = self.mesh(step, &set, &images)?;
-        Ok(MeshedStep { set, images, mesh, mesh_px: 0, loose: None, is_first: false })
+        Ok(MeshedStep { set, images, mesh, loose: None, is_first: false })
     }
 
     /// Returns the mesh around the parts' images.
@@ -239,7 +239,7 @@ impl Composer {
         step: usize,
         set: &LayerSet,
         images: &[(usize, Image)],
-    ) -> Result<Option<MeshRows>, RecipeError> {
+    ) -> Result<Option<Arc<LayerMesh>>, RecipeError> {
         let canvas = self.canvas.clone();
         let layout = &canvas.layout;
         let Some(mesh) = &layout.mesh else { return Ok(None) };
