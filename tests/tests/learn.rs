@@ -123,7 +123,7 @@ fn heights_that_are_too_low_shorten_times() {
     scratch.write("more.csv", heights.replace("1.0,20", "1.1,20").as_bytes());
     scratch
         .run("lamp learn job/ --measured more.csv --law single -o law.csv")
-        .is_refused_with(&["heights teach the state of light and resin"]);
+        .is_refused_with(&["heights and places teach the state of light and resin"]);
     // Nor may it be missing.
     std::fs::remove_file(scratch.path("job/print-001-state.toml")).unwrap();
     scratch

@@ -101,6 +101,55 @@ fn a_height_map_teaches_as_a_table_does() {
 }
 
 #[test]
+fn mirrors_have_the_light_of_a_picture() {
+    let scratch = with_job();
+    let print = |truth: &str, options: &str| {
+        scratch.write("plant.toml", truth.as_bytes());
+        printed(&scratch, options);
+        scratch.bytes("heights.csv")
+    };
+    let light = |left: u8, right: u8| {
+        let row: Vec<u8> = (0..1024).map(|at| if at < 512 { left } else { right }).collect();
+        let mut png = Vec::new();
+        write_gray_png(&mut png, 1024, 768, vec![row; 768].into_iter()).unwrap();
+        scratch.write("light.png", &png);
+    };
+    let even = print("", "");
+    light(77, 77);
+    assert_eq!(print("flat-field = 'light.png'", ""), even);
+    // Far from the middle, heights are as by the light of their side.
+    light(240, 160);
+    let rows = |table: Vec<u8>| -> Vec<Vec<f64>> {
+        let text = String::from_utf8(table).unwrap();
+        let cells = |line: &str| line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        text.lines().skip(1).map(cells).collect()
+    };
+    let both = rows(print("flat-field = 'light.png'", ""));
+    let (left, right) = (rows(print("light = '+20%'", "")), rows(print("light = '-20%'", "")));
+    let most = both.iter().map(|row| row[0]).fold(0.0, f64::max);
+    let (mut compared, mut differ) = (0, 0);
+    for ((both, left), right) in both.iter().zip(&left).zip(&right) {
+        if both[0].abs() > 0.4 * most {
+            let of_side = if both[0] < 0.0 { left } else { right };
+            assert!((both[3] - of_side[3]).abs() < 1e-4, "{both:?} {of_side:?}");
+            compared += 1;
+            differ += usize::from((left[3] - right[3]).abs() > 1e-3);
+        }
+    }
+    assert!(compared > 900 && differ > 100, "{compared} {differ}");
+    scratch.write("plant.toml", b"layer-picture = 'light.png'");
+    let layer = "lamp print-sim job/ --truth plant.toml -o m.csv";
+    scratch.run(layer).is_refused_with(&["`layer-picture`, which is not of this job's model"]);
+    let mut png = Vec::new();
+    write_gray_png(&mut png, 2, 2, vec![vec![9; 2]; 2].into_iter()).unwrap();
+    scratch.write("small.png", &png);
+    scratch.write("plant.toml", b"flat-field = 'small.png'");
+    scratch
+        .run(layer)
+        .is_refused_with(&["small.png: 2 x 2 pixels, but the display has 1024 x 768"]);
+}
+
+#[test]
 fn a_job_of_columns_is_repeatable_and_guarded() {
     let scratch = with_job();
     printed(&scratch, "");

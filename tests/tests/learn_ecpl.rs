@@ -104,6 +104,7 @@ fn what_kinetics_cannot_learn_from_is_refused() {
         scratch.write("other.toml", truth.as_bytes());
         scratch.run("lamp print-sim job/ --truth other.toml -o a.csv")
     };
+    sim("flat-field = 'light.png'\n").is_refused_with(&["`flat-field`", "leave it out"]);
     sim("critical-dose = '+5%'\n").is_refused_with(&[
         "other.toml",
         "`critical-dose`",

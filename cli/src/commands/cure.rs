@@ -144,13 +144,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let (material, lamp_doubt) = args.lamp.material(document(&args.material)?)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let rule = args.rule(&material)?;
-    let places = args.places.as_ref().map(|path| {
-        let places = || -> anyhow::Result<_> {
-            Ok(Places::parse(&read_text(path, MAX_PLACES, "a file of places")?)?)
-        };
-        places().map_err(|error| Exit::Failed(error).at(path.display().to_string()))
-    });
-    let places = places.transpose()?;
+    let places = args.places.as_deref().map(read_places).transpose()?;
     let name = input_name(&args.input.stack);
     let failed = |error| Exit::Failed(error).at(input_name(&args.input.stack));
     let no_section = |error: CureSectionError| failed(error.into());
@@ -238,6 +232,14 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
 
 /// Files of places are lists of a few lines each.
 const MAX_PLACES: u64 = 1 << 20;
+
+/// Reads a file of places.
+pub(super) fn read_places(path: &Path) -> Result<Places, Exit> {
+    let places = || -> anyhow::Result<_> {
+        Ok(Places::parse(&read_text(path, MAX_PLACES, "a file of places")?)?)
+    };
+    places().map_err(|error| Exit::Failed(error).at(path.display().to_string()))
+}
 
 /// Returns the sizes of places as a table.
 fn places_text(sizes: &[(&Place, CuredSizes)], material: &str, rule: CureRule) -> String {

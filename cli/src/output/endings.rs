@@ -67,6 +67,11 @@ const JSON: Writes =
 const TABLE: Writes =
     Writes { sentence: "a table is CSV: end its name in .csv", endings: &["csv", "txt"] };
 
+const MEASURED: Writes = Writes {
+    sentence: "measurements are a table or a file of places: end its name in .csv or .toml",
+    endings: &["csv", "txt", "toml"],
+};
+
 const TOML: Writes =
     Writes { sentence: "it is written as TOML: end its name in .toml", endings: &["toml"] };
 
@@ -203,6 +208,11 @@ pub(crate) fn parse_json(text: &str) -> Result<PathBuf, String> {
 /// Parses the name of a CSV file.
 pub(crate) fn parse_table(text: &str) -> Result<PathBuf, String> {
     parse(text, &TABLE)
+}
+
+/// Parses the name of a file of measurements: a CSV table, or places in TOML.
+pub(crate) fn parse_measured(text: &str) -> Result<PathBuf, String> {
+    parse(text, &MEASURED)
 }
 
 /// Parses the name of a TOML file.

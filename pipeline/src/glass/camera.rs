@@ -1,17 +1,14 @@
 //! The light of a projector from a camera's picture of it.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::PathBuf;
 
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::projector::{CameraError, CameraFit, CameraPicture, Projector};
-use lamp_planning::target::GrayPicture;
 use lamp_planning::{MirrorSeconds, ShownBitmap};
 use lamp_stack::Length;
 
-use super::bitmaps_of;
 use super::target::of_work;
+use super::{bitmaps_of, gray_picture};
 use crate::Error;
 
 /// A camera's picture, and the image that the display showed.
@@ -33,11 +30,7 @@ impl CameraSettings {
     /// not show its light.
     pub fn fit(&self, projector: &Projector) -> Result<CameraFit, Error> {
         let at_picture = |error: Error| error.at(self.picture.display().to_string());
-        let read = || -> Result<GrayPicture, Error> {
-            let file = File::open(&self.picture)?;
-            GrayPicture::read(BufReader::new(file)).map_err(of_work)
-        };
-        let picture = read().map_err(at_picture)?;
+        let picture = gray_picture(&self.picture)?;
         let images = bitmaps_of(&self.shown, projector)?;
         let [ShownBitmap { image, .. }] = &images[..] else {
             let error = Error::work(format!(

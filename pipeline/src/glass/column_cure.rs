@@ -1,8 +1,7 @@
 //! The settings of column cure, and the plan that they ask for.
 
 use std::fmt;
-use std::fs::{self, File};
-use std::io::BufReader;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -12,8 +11,8 @@ use lamp_planning::column::{
     ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Setup, Stop, Tracing, plan,
 };
 use lamp_planning::learn::{ColumnLight, Columns, GlassModel, GlassState};
-use lamp_planning::projector::Projector;
-use lamp_planning::target::{GrayPicture, Grid, HeightMap};
+use lamp_planning::projector::{FieldPicture, Projector};
+use lamp_planning::target::{Grid, HeightMap};
 use lamp_planning::{MirrorSeconds, ShownBitmap};
 use lamp_stack::{Length, quoted};
 use serde::{Deserialize, Serialize};
@@ -22,7 +21,7 @@ use super::column_measures::unmeasured_heights;
 use super::column_report::report_of;
 use super::job::{GlassJob, GlassKind, GlassSettings, PlanInputs};
 use super::target::{GivenTarget, TargetSettings, of_work};
-use super::{GlassPlan, json_of};
+use super::{GlassPlan, field_picture, json_of};
 use crate::documents::document_and_word;
 use crate::error::Error;
 use crate::heights::parse_share;
@@ -326,7 +325,25 @@ impl ColumnCureSettings {
     /// Returns the light of the mirrors that a setup uses. Empty: all are alike.
     fn flat_field(&self, setup: &Setup) -> Result<Vec<f64>, Error> {
         let Some(path) = &self.flat_field else { return Ok(Vec::new()) };
-        flat_field(path, setup).map_err(|error| error.at(path.display().to_string()))
+        let picture = field_picture(path)?;
+        mirror_shares(&picture, setup).map_err(|error| error.at(path.display().to_string()))
+    }
+
+    /// Returns bitmaps' light in the flat field of a picture of the display, which replaces the settings'
+    /// own.
+    ///
+    /// # Errors
+    /// Returns an error if the picture cannot be read, or has another size than the display.
+    pub fn in_field(
+        &self,
+        model: &Columns,
+        light: &ColumnLight,
+        picture: &Path,
+    ) -> Result<ColumnLight, Error> {
+        let of_display = Setup::of(&model.projector, &model.wanted.grid, self.rays);
+        let setup = Setup { mirrors: light.shown.mirrors, ..of_display };
+        let there = Self { flat_field: Some(picture.to_owned()), ..self.clone() };
+        Ok(ColumnLight { shown: light.shown.clone(), flat_field: there.flat_field(&setup)? })
     }
 
     /// Returns the files from which the plan can be made again.
@@ -505,25 +522,17 @@ impl ColumnCure {
     }
 }
 
-/// Reads the light of the mirrors that a setup uses.
-fn flat_field(path: &Path, setup: &Setup) -> Result<Vec<f64>, Error> {
-    let file = File::open(path)?;
-    let picture = GrayPicture::read(BufReader::new(file)).map_err(of_work)?;
+/// Returns the light of the mirrors that a setup uses.
+fn mirror_shares(picture: &FieldPicture, setup: &Setup) -> Result<Vec<f64>, Error> {
     let [columns, rows] = setup.display;
-    if [picture.columns, picture.rows] != [columns, rows] {
-        let (width, height) = (picture.columns, picture.rows);
+    if picture.size() != [columns, rows] {
+        let [width, height] = picture.size();
         return Err(Error::work(format!(
             "{width} x {height} pixels, but the display has {columns} x {rows} mirrors"
         )));
     }
-    let sum: f64 = picture.levels.iter().map(|&level| f64::from(level)).sum();
-    if sum == 0.0 {
-        return Err(Error::work("all black: no mirror has light"));
-    }
-    let mean = sum / picture.levels.len() as f64;
     // The mirrors in use are the middle of the display.
     let [left, top] = [0, 1].map(|axis| (setup.display[axis] - setup.mirrors[axis]) / 2);
-    let row = |row: usize| &picture.levels[row * columns + left..][..setup.mirrors[0]];
-    let used = (top..top + setup.mirrors[1]).flat_map(row);
-    Ok(used.map(|&level| f64::from(level) / mean).collect())
+    let row = |row: usize| &picture.row(row)[left..][..setup.mirrors[0]];
+    Ok((top..top + setup.mirrors[1]).flat_map(row).copied().collect())
 }

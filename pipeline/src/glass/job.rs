@@ -390,6 +390,11 @@ impl<S: GlassSettings> GlassJob<S> {
         self.settings.model(&self.projector, material)
     }
 
+    /// Returns the settings of the plan.
+    pub fn settings(&self) -> &S {
+        &self.settings
+    }
+
     /// Returns the name of the part.
     pub fn part(&self) -> &str {
         &self.part
@@ -461,7 +466,7 @@ impl<S: GlassSettings> GlassJob<S> {
         watcher: &dyn Watcher,
     ) -> Result<GlassLesson, Error> {
         let PrintMeasurements::Heights(rows) = measured else {
-            return Err(Error::work("a plan on a glass learns from heights, not from layers"));
+            return Err(Error::work("a plan on a glass learns from heights alone"));
         };
         // A height in micrometers where millimeters are meant would make a state that no print has.
         let highest_mm = rows.iter().map(|row| row.z_mm).fold(0.0, f64::max);

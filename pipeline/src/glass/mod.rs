@@ -10,11 +10,13 @@ mod job;
 mod kinetics_report;
 mod target;
 
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
 use lamp_grayscale::resin::ExposureTime;
-use lamp_planning::projector::Projector;
-use lamp_planning::target::HeightMap;
+use lamp_planning::projector::{FieldPicture, Projector};
+use lamp_planning::target::{GrayPicture, HeightMap};
 use lamp_planning::{PlanPages, ShownBitmap};
 use lamp_stack::{Length, Page};
 use serde::Serialize;
@@ -22,6 +24,7 @@ use serde_json::Value;
 
 use crate::Error;
 use crate::documents::open_stack;
+use target::of_work;
 
 pub use camera::CameraSettings;
 pub use column_cure::{
@@ -86,6 +89,24 @@ fn bitmaps_of(path: &Path, projector: &Projector) -> Result<Vec<ShownBitmap>, Er
         bitmaps.push(ShownBitmap { image, time });
     }
     Ok(bitmaps)
+}
+
+/// Reads a picture of gray levels.
+fn gray_picture(path: &Path) -> Result<GrayPicture, Error> {
+    let read = || -> Result<GrayPicture, Error> {
+        let file = File::open(path)?;
+        GrayPicture::read(BufReader::new(file)).map_err(of_work)
+    };
+    read().map_err(|error| error.at(path.display().to_string()))
+}
+
+/// Reads a picture of the light over a field.
+///
+/// # Errors
+/// Returns an error if it is not a picture of gray levels, or is all black.
+pub fn field_picture(path: &Path) -> Result<FieldPicture, Error> {
+    let picture = FieldPicture::of(&gray_picture(path)?);
+    picture.map_err(|error| of_work(error).at(path.display().to_string()))
 }
 
 /// Returns a report as JSON.

@@ -11,4 +11,5 @@ pub use areas::{CuredPanel, PartAreas, SectionAreas, ShownSection};
 pub use error::{CureSectionError, PlacesError, UnknownPlane};
 pub use exposures::{CureRule, CureSection};
 pub use line::{SectionLine, SectionPlane};
+pub(crate) use places::Shape;
 pub use places::{CuredPlaces, CuredSizes, Place, PlaceSize, Places};

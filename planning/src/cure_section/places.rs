@@ -45,11 +45,13 @@ pub struct Places(Vec<Place>);
 pub struct Place {
     /// Its name.
     pub name: String,
-    shape: Shape,
+    pub(crate) shape: Shape,
     /// The wanted size.
     pub wanted: Option<PlaceSize>,
     /// The size measured on a print.
     pub measured: Option<PlaceSize>,
+    /// The standard deviation of the measured size.
+    pub sd: Option<PlaceSize>,
 }
 
 /// A size of a place.
@@ -73,7 +75,7 @@ impl PlaceSize {
 
 /// A line or a box, with ranges in millimeters. A range may be endless.
 #[derive(Clone, Debug, PartialEq)]
-enum Shape {
+pub(crate) enum Shape {
     /// Along z.
     Column {
         x: Length,
@@ -106,6 +108,8 @@ const ALL: Range<f64> = f64::NEG_INFINITY..f64::INFINITY;
 #[serde(deny_unknown_fields)]
 struct PlacesFile {
     place: Vec<PlaceTable>,
+    /// Another table of the same print.
+    csv: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -117,6 +121,7 @@ struct PlaceTable {
     z: Option<Coordinate>,
     wanted: Option<String>,
     measured: Option<String>,
+    sd: Option<String>,
 }
 
 /// A length, or the ends of a range.
@@ -154,7 +159,7 @@ impl<'de> Deserialize<'de> for Coordinate {
 impl Place {
     fn new(table: PlaceTable) -> Result<Self, PlacesError> {
         use Coordinate::{At, Within};
-        let PlaceTable { name, x, y, z, wanted, measured } = table;
+        let PlaceTable { name, x, y, z, wanted, measured, sd } = table;
         let shape = match [x, y, z].map(|of| of.unwrap_or(Within(ALL))) {
             [At(x), At(y), Within(z)] => Shape::Column { x, y, z },
             [Within(x), At(y), At(z)] => Shape::AlongX { y, z, x },
@@ -174,12 +179,60 @@ impl Place {
             size.map_err(|problem| PlacesError::Size { name: name.clone(), key, problem })
         };
         let (wanted, measured) = (size(wanted, "wanted")?, size(measured, "measured")?);
-        Ok(Self { name, shape, wanted, measured })
+        let sd = size(sd, "sd")?;
+        Ok(Self { name, shape, wanted, measured, sd })
+    }
+
+    /// Returns the place as TOML.
+    fn to_toml(&self) -> String {
+        let mut text = format!("[[place]]\nname = {}\n", toml::Value::from(self.name.as_str()));
+        let mut line = |key: &str, value: String| text += &format!("{key} = {value}\n");
+        let at = |length: &Length| Some(format!("\"{}mm\"", length.mm()));
+        // A range without ends is left out.
+        let within = |range: &Range<f64>| {
+            let text = format!("[\"{}mm\", \"{}mm\"]", range.start, range.end);
+            range.start.is_finite().then_some(text)
+        };
+        let [x, y, z] = match &self.shape {
+            Shape::Column { x, y, z } => [at(x), at(y), within(z)],
+            Shape::AlongX { y, z, x } => [within(x), at(y), at(z)],
+            Shape::AlongY { x, z, y } => [at(x), within(y), at(z)],
+            Shape::Box { x, y, z } => [within(x), within(y), within(z)],
+        };
+        for (axis, text) in [("x", x), ("y", y), ("z", z)] {
+            if let Some(text) = text {
+                line(axis, text);
+            }
+        }
+        let sizes = [("wanted", self.wanted), ("measured", self.measured), ("sd", self.sd)];
+        for (key, size) in sizes.into_iter().filter_map(|(key, size)| Some((key, size?))) {
+            line(
+                key,
+                match size {
+                    PlaceSize::Length(length) => format!("\"{}um\"", length.um()),
+                    PlaceSize::Volume(mm3) => format!("\"{mm3}mm3\""),
+                },
+            );
+        }
+        text
     }
 
     /// Returns the unit of its size: `um` or `mm3`.
     pub fn unit(&self) -> &'static str {
         if matches!(self.shape, Shape::Box { .. }) { "mm3" } else { "um" }
+    }
+
+    /// Returns a length as a size of the place, if that is a length.
+    pub(crate) fn length(&self, um: f64) -> Option<PlaceSize> {
+        let is_box = matches!(self.shape, Shape::Box { .. });
+        (!is_box).then(|| PlaceSize::Length(Length::from_um(um)))
+    }
+
+    /// Returns a number in the place's unit as its size, as a table has it: to the nanometer, or to a cube
+    /// of 10 um.
+    pub(crate) fn rounded(&self, number: f64) -> PlaceSize {
+        let length = self.length((1000.0 * number).round() / 1000.0);
+        length.unwrap_or(PlaceSize::Volume((1e6 * number).round() / 1e6))
     }
 
     /// Returns the planes of the sections that show the place, in images like the layer's.
@@ -256,6 +309,11 @@ impl Places {
     /// Returns an error if the text is not TOML, if a key is unknown, missing or wrong, if two places
     /// have one name, or if a place is a point.
     pub fn parse(text: &str) -> Result<Self, PlacesError> {
+        Self::parse_with_table(text).map(|(places, _)| places)
+    }
+
+    /// Reads places, and the text of the table `csv` of the same print, if there is one.
+    pub(crate) fn parse_with_table(text: &str) -> Result<(Self, Option<String>), PlacesError> {
         let file: PlacesFile = read_toml(text)?;
         let mut places: Vec<Place> = Vec::new();
         for table in file.place {
@@ -265,7 +323,17 @@ impl Places {
             }
             places.push(place);
         }
-        Ok(Self(places))
+        Ok((Self(places), file.csv))
+    }
+
+    /// Returns places that have other names.
+    pub(crate) fn of(places: Vec<Place>) -> Self {
+        Self(places)
+    }
+
+    /// Returns the file of the places, which [`parse`](Self::parse) reads.
+    pub fn to_toml(&self) -> String {
+        self.0.iter().map(Place::to_toml).collect::<Vec<_>>().join("\n")
     }
 
     /// Returns the places, in the order of their file.
@@ -427,6 +495,20 @@ mod tests {
         for (found, expected) in sizes(text).unwrap().into_iter().zip(expected) {
             assert!((found - expected).abs() < 1e-6, "{found} {expected}");
         }
+    }
+
+    #[test]
+    fn a_written_file_reads_back() {
+        let text = "
+            place = [
+                { name = 'a \"notch\"', x = '10.35mm', y = '20.4mm', z = ['3mm', '9.5mm'] },
+                { name = 'wide', y = '-20.4mm', z = '3.05mm', wanted = '479um', sd = '2.5um' },
+                { name = 'deep', x = '0.1mm', z = '3mm', measured = '0.47912mm' },
+                { name = 'all', z = ['3mm', '9mm'], wanted = '0.25mm3', measured = '0.1mm3' },
+            ]";
+        let places = Places::parse(text).unwrap();
+        let written = places.to_toml();
+        assert_eq!(Places::parse(&written).unwrap(), places, "{written}");
     }
 
     #[test]

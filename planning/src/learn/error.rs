@@ -9,7 +9,9 @@ use lamp_stack::CatalogueError;
 use thiserror::Error;
 
 use super::heights::FaceError;
+use super::place::PlaceError;
 use crate::column::NoHeights;
+use crate::cure_section::{PlaceSize, PlacesError};
 use crate::ecpl::RingPlanError;
 use crate::resin_light::NoLight;
 use crate::speed::{PartError, PlatformError, SpeedPlanError};
@@ -27,6 +29,26 @@ pub enum MeasuredError {
     /// It has only a header.
     #[error("there are no measurements below the header")]
     Empty,
+    /// It is not a file of places.
+    #[error(transparent)]
+    Places(#[from] PlacesError),
+    /// The table beside places has places itself.
+    #[error("csv: places are no table")]
+    PlacesTwice,
+    /// No place was measured.
+    #[error("no place states a `measured` size")]
+    NoPlaceMeasured,
+    /// A place was measured, but its wanted size is unknown.
+    #[error("the place {0} is measured, but states no `wanted` size: prints are compared by both")]
+    NoWanted(String),
+    /// The standard deviation of a place's size is impossible.
+    #[error("the place {name}: a standard deviation of {sd} is impossible")]
+    PlaceDeviation {
+        /// The place's name.
+        name: String,
+        /// The standard deviation.
+        sd: PlaceSize,
+    },
     /// A standard deviation is below what can be measured.
     #[error(
         "line {line}, column sd_um: {sd_um} um is finer than any measurement: write {least} or more"
@@ -231,11 +253,20 @@ pub enum LearnError {
         most: f64,
     },
     /// A law is for wrong pixels.
-    #[error("heights teach the state of light and resin: --law is for wrong pixels")]
+    #[error("heights and places teach the state of light and resin: --law is for wrong pixels")]
     LawOfHeights,
     /// The stack's pages do not state their position on the part.
     #[error("the stack's pages do not state their position on the part")]
     NoPosition,
+    /// A named place has no size.
+    // No source: this message contains the problem's text.
+    #[error("the place {name}: {problem}")]
+    Place {
+        /// Its name.
+        name: String,
+        /// Why not.
+        problem: PlaceError,
+    },
     /// A place is outside the images.
     #[error("line {line}, z {z_mm} mm: the place {}, {} mm is outside the images", place_mm[0], place_mm[1])]
     Outside {

@@ -5,11 +5,16 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use lamp_grayscale::calibrate::{CsvTable, NumberRow};
 
 use super::error::MeasuredError;
+use crate::cure_section::{Place, PlaceSize, Places};
 
 const HEIGHTS: [&str; 5] = ["x_mm", "y_mm", "z_mm", "measured_mm", "sd_um"];
 const AREAS: [&str; 3] = ["layer", "over_px", "under_px"];
 /// The standard deviation of heights that do not state one.
 const USUAL_SD_UM: f64 = 20.0;
+/// The standard deviation of volumes that do not state one, as a share, and the least one, of a cube of
+/// 10 um.
+const USUAL_VOLUME_SD: f64 = 0.02;
+const LEAST_VOLUME_MM3: f64 = 1e-6;
 /// The least standard deviation of heights, in micrometers: steps between atoms are not much smaller.
 const LEAST_SD_UM: f64 = 0.001;
 
@@ -20,6 +25,13 @@ pub enum PrintMeasurements {
     Heights(Vec<HeightRow>),
     /// Wrongly cured pixels of layers.
     Areas(Vec<AreaRow>),
+    /// Sizes of named places, all of which are wanted and measured.
+    Places {
+        /// The places.
+        places: Places,
+        /// Another table of the same print.
+        table: Option<Box<PrintMeasurements>>,
+    },
 }
 
 /// A measured height, in part coordinates.
@@ -58,6 +70,32 @@ pub struct AreaRow {
     pub under: f64,
 }
 
+/// Returns a size as a length in micrometers: a volume is a cube's.
+fn length_um(size: Option<PlaceSize>) -> f64 {
+    match size {
+        Some(PlaceSize::Length(length)) => length.um(),
+        Some(PlaceSize::Volume(mm3)) => 1000.0 * mm3.cbrt(),
+        None => 0.0,
+    }
+}
+
+/// Returns whether a text is a file of places, and no table.
+fn is_places(text: &str) -> bool {
+    // A comma comes before any equals sign in the header of a table.
+    let first =
+        text.lines().map(str::trim).find(|line| !(line.is_empty() || line.starts_with('#')));
+    first.is_some_and(|line| line.starts_with("[[") || line.contains('='))
+}
+
+/// Returns the standard deviation of a place's measured size, in its unit.
+pub(crate) fn sd_of_place(place: &Place, size: f64) -> f64 {
+    match (place.sd, place.unit()) {
+        (Some(sd), _) => sd.number(),
+        (None, "mm3") => (USUAL_VOLUME_SD * size).max(LEAST_VOLUME_MM3),
+        (None, _) => USUAL_SD_UM,
+    }
+}
+
 /// The error of a print.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PrintError {
@@ -92,6 +130,22 @@ impl PrintMeasurements {
                 };
                 own.len() == other.len() && places(own) == places(other)
             }
+            (
+                Self::Places { places: own, table: own_table },
+                Self::Places { places: other, table },
+            ) => {
+                let is_same = |(own, other): (&Place, &Place)| {
+                    own.shape == other.shape && own.wanted == other.wanted
+                };
+                let are_same = own.all().len() == other.all().len()
+                    && own.all().iter().zip(other.all()).all(is_same);
+                match (own_table, table) {
+                    // The error is the table's.
+                    (Some(own), Some(other)) => own.is_comparable(other),
+                    (None, None) => are_same,
+                    _ => false,
+                }
+            }
             _ => false,
         }
     }
@@ -107,21 +161,75 @@ impl PrintMeasurements {
                 let squares: f64 = rows.iter().map(square).sum();
                 PrintError::Micrometers((squares / rows.len() as f64).sqrt())
             }
+            Self::Places { table: Some(table), .. } => table.error(),
+            Self::Places { places, table: None } => {
+                let square = |place: &Place| {
+                    let [measured, wanted] = [place.measured, place.wanted].map(length_um);
+                    (measured - wanted).powi(2)
+                };
+                let squares: f64 = places.all().iter().map(square).sum();
+                PrintError::Micrometers((squares / places.all().len() as f64).sqrt())
+            }
         }
     }
 
-    /// Reads a table: of heights, or of areas if it has the column `layer`.
+    /// Joins the texts of two tables of one print, one of which has named places. Returns `None` if not
+    /// just one has.
+    pub fn joined(texts: [&str; 2]) -> Option<String> {
+        let [one, other] = texts;
+        let (places, table) = match [one, other].map(is_places) {
+            [true, false] => (one, other),
+            [false, true] => (other, one),
+            _ => return None,
+        };
+        // A key of the file stands before its places.
+        Some(format!("csv = {}\n\n{places}", toml::Value::from(table)))
+    }
+
+    fn places(text: &str) -> Result<Self, MeasuredError> {
+        let (places, table) = Places::parse_with_table(text)?;
+        let table = table.map(|table| match is_places(&table) {
+            true => Err(MeasuredError::PlacesTwice),
+            false => Self::parse(&table).map(Box::new),
+        });
+        let table = table.transpose()?;
+        let measured: Vec<_> =
+            places.all().iter().filter(|place| place.measured.is_some()).cloned().collect();
+        for place in &measured {
+            let name = || place.name.clone();
+            if place.wanted.is_none() {
+                return Err(MeasuredError::NoWanted(name()));
+            }
+            let least = match place.sd {
+                Some(PlaceSize::Length(_)) => LEAST_SD_UM,
+                _ => f64::MIN_POSITIVE,
+            };
+            if let Some(sd) = place.sd.filter(|sd| !(least..1e9).contains(&sd.number())) {
+                return Err(MeasuredError::PlaceDeviation { name: name(), sd });
+            }
+        }
+        match measured.is_empty() {
+            true => Err(MeasuredError::NoPlaceMeasured),
+            false => Ok(Self::Places { places: Places::of(measured), table }),
+        }
+    }
+
+    /// Reads a table: of heights, or of areas if it has the column `layer`; or a file of places.
     ///
     /// # Errors
-    /// Returns an error if a column is missing or unknown, a number is impossible, or a place or
-    /// layer is listed twice.
+    /// Returns an error if a column is missing or unknown, a number is impossible, a place or
+    /// layer is listed twice, or a measured place has no wanted size.
     pub fn parse(text: &str) -> Result<Self, MeasuredError> {
+        if is_places(text) {
+            return Self::places(text);
+        }
         let table = CsvTable::parse(text)?;
         let has = |column: &str| table.columns().iter().any(|name| name == column);
         let measured = if has("layer") { Self::areas(&table)? } else { Self::heights(&table)? };
         let count = match &measured {
             Self::Heights(rows) => rows.len(),
             Self::Areas(rows) => rows.len(),
+            Self::Places { places, .. } => places.all().len(),
         };
         if count == 0 {
             return Err(MeasuredError::Empty);
@@ -129,8 +237,8 @@ impl PrintMeasurements {
         Ok(measured)
     }
 
-    /// Returns the table, which [`parse`](Self::parse) reads.
-    pub fn to_csv(&self) -> String {
+    /// Returns the table or the file of places, which [`parse`](Self::parse) reads.
+    pub fn to_text(&self) -> String {
         let (columns, rows): (&[&str], Vec<String>) = match self {
             Self::Heights(rows) => {
                 let line = |row: &HeightRow| {
@@ -142,6 +250,11 @@ impl PrintMeasurements {
             Self::Areas(rows) => {
                 let line = |row: &AreaRow| format!("{},{},{}\n", row.layer, row.over, row.under);
                 (&AREAS, rows.iter().map(line).collect())
+            }
+            Self::Places { places, table } => {
+                let table = table.as_ref().map(|table| table.to_text());
+                let csv = table.map(|csv| format!("csv = {}\n\n", toml::Value::from(csv)));
+                return csv.unwrap_or_default() + &places.to_toml();
             }
         };
         format!("{}\n{}", columns.join(","), rows.concat())
@@ -210,6 +323,35 @@ mod tests {
         let areas = PrintMeasurements::parse("layer,over_px,under_px\n7,5,0\n").unwrap();
         let row = AreaRow { line: 2, layer: 7, over: 5.0, under: 0.0 };
         assert_eq!(areas, PrintMeasurements::Areas(vec![row]));
+    }
+
+    #[test]
+    fn places_are_told_from_tables() {
+        let place =
+            |keys: &str| format!("# measured\n[[place]]\nname = 'p'\nx = '1mm'\ny = '1mm'\n{keys}");
+        let parse = PrintMeasurements::parse;
+        let known = parse(&place("wanted = '500um'\nmeasured = '480um'")).unwrap();
+        assert_eq!(known.error(), PrintError::Micrometers(20.0));
+        let other = parse(&place("wanted = '500um'\nmeasured = '490um'")).unwrap();
+        assert!(known.is_comparable(&other));
+        let wider = parse(&place("wanted = '501um'\nmeasured = '490um'")).unwrap();
+        assert!(!known.is_comparable(&wider));
+        let refused = |keys: &str| parse(&place(keys)).unwrap_err();
+        assert_eq!(refused("measured = '480um'"), MeasuredError::NoWanted("p".to_owned()));
+        assert_eq!(refused("wanted = '480um'"), MeasuredError::NoPlaceMeasured);
+        let both = "wanted = '480um'\nmeasured = '480um'\n";
+        let exact = refused(&format!("{both}sd = '0um'")).to_string();
+        assert_eq!(exact, "the place p: a standard deviation of 0.0 um is impossible");
+        let joined = |other: &str| PrintMeasurements::joined([other, &place(both)]).unwrap();
+        let table = "layer,over_px,under_px\n7,5,0\n";
+        assert_eq!(parse(&joined(table)).unwrap().error(), PrintError::Pixels(5.0));
+        assert!(!parse(&joined(table)).unwrap().is_comparable(&known));
+        assert_eq!(PrintMeasurements::joined([table, table]), None);
+        let twice = format!("csv = \"\"\"\n{}\"\"\"\n{}", place(both), place(both));
+        assert_eq!(parse(&twice), Err(MeasuredError::PlacesTwice));
+        // A volume counts as the side of its cube.
+        let volume = "[[place]]\nname = 'all'\nwanted = '8mm3'\nmeasured = '1mm3'\n";
+        assert_eq!(parse(volume).unwrap().error(), PrintError::Micrometers(1000.0));
     }
 
     #[test]

@@ -18,6 +18,7 @@ mod heights;
 mod job;
 mod law;
 mod measured;
+mod place;
 mod response;
 mod rings;
 mod state;
@@ -34,7 +35,10 @@ pub use job::{
     requested_print, sealed_text, take_back,
 };
 pub use law::{Law, MultiLaw, SHORTEST, errors_of};
+pub(crate) use measured::sd_of_place;
 pub use measured::{AreaRow, HeightRow, PrintError, PrintMeasurements};
+pub use place::PlaceError;
+pub(crate) use place::PlacePixels;
 pub use response::Response;
 pub use rings::{RingChange, Rings};
 pub use state::{Factor, LightState, Unseparated};

@@ -13,9 +13,11 @@ use std::rc::Rc;
 use lamp_grayscale::material::{Given, Material};
 use lamp_grayscale::resin::{Intensity, Quantity};
 use lamp_stack::Length;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::heights::{height_of, height_with};
+use super::place::PlacePixels;
 use crate::light::{IntensityOf, Light};
 use crate::numeric::{dot, solve_positive};
 use crate::speed::{DoseGrid, PartError, Simulation, TimedPart};
@@ -191,12 +193,14 @@ pub(crate) struct MeasuredPrint {
 }
 
 /// A measurement, and the layer whose dose decides it, counted from the light.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum Measurement {
     /// The wrong voxels of a layer: cured outside the part, and of the part but not cured.
     Counts { layer: usize, counts: [f64; 2] },
     /// The height down to which a face is cured, and its standard deviation, in micrometers.
     Height { layer: usize, pixel: [u32; 2], um: f64, sd_um: f64 },
+    /// The size of a place and its standard deviation, in micrometers or mm³.
+    Size { place: PlacePixels, size: f64, sd: f64 },
 }
 
 /// The prediction of a model for a number that was measured.
@@ -224,6 +228,20 @@ struct Spreading<'a> {
     log_spread: f64,
     simulation: Simulation<'a>,
     pixels: HashMap<[u32; 2], Vec<f32>>,
+}
+
+/// Returns the logarithms of the doses of a place's pixels in each layer.
+fn logs_of(
+    place: &PlacePixels,
+    simulation: &Simulation<'_>,
+    lights: &mut HashMap<[u32; 2], Vec<f32>>,
+    times: &[f64],
+) -> Vec<Vec<f64>> {
+    let of_pixel = |pixel: &[u32; 2]| {
+        let lights = lights.entry(*pixel).or_insert_with(|| simulation.light_at(*pixel));
+        simulation.doses_of(lights, times).into_iter().map(f64::ln).collect()
+    };
+    place.pixels().iter().map(of_pixel).collect()
 }
 
 /// The spreads whose light is kept: enough for a state and the states around it.
@@ -314,11 +332,23 @@ impl<'a> Model<'a> {
                         None => Predicted { residual: (um - top_um(part)) / sd_um, slope: 0.0 },
                     });
                 }
+                Measurement::Size { place, size, sd } => {
+                    let Spreading { simulation, pixels, .. } = &mut *known;
+                    let doses = logs_of(place, simulation, pixels, &print.times);
+                    let modeled = |more| place.size(part, &light, &doses, more);
+                    let slope =
+                        (modeled(SIZE_CHANGE) - modeled(-SIZE_CHANGE)) / (2.0 * SIZE_CHANGE);
+                    let residual = (size - modeled(0.0)) / sd;
+                    all.push(Predicted { residual, slope: slope / sd });
+                }
             }
         }
         Ok(all)
     }
 }
+
+/// The change of the dose's logarithm over which the slope of a size is taken.
+const SIZE_CHANGE: f64 = 0.02;
 
 /// Returns the variance of a count, given the standard deviation of its edges and the pixels that each
 /// column of the model stands for.
@@ -382,6 +412,18 @@ impl Model<'_> {
                         let height = height_with(part, &doses, factor, &light, *layer);
                         let height_um = height.map_or(top_um, Length::um);
                         let square = ((um - height_um) / sd_um).powi(2);
+                        sharp[number] += square;
+                        loose[number] += square;
+                    }
+                }
+                Measurement::Size { place, size, sd } => {
+                    let doses = logs_of(place, simulation, pixels, &print.times);
+                    let square = |number: usize| {
+                        let modeled = place.size(part, &light, &doses, grid.log(number));
+                        ((size - modeled) / sd).powi(2)
+                    };
+                    let squares: Vec<_> = (0..grid.count()).into_par_iter().map(square).collect();
+                    for (number, square) in squares.into_iter().enumerate() {
                         sharp[number] += square;
                         loose[number] += square;
                     }

@@ -7,10 +7,12 @@ use super::error::LearnError;
 use super::heights::{FaceError, face_at};
 use super::job::Job;
 use super::law::Law;
-use super::measured::{AreaRow, HeightRow, PrintMeasurements};
+use super::measured::{AreaRow, HeightRow, PrintMeasurements, sd_of_place};
+use super::place::PlacePixels;
 use super::response::Response;
 use super::state::{Forecast, LightState, MeasuredPrint, Measurement, Model};
 use super::state::{ProbableStates, states_of};
+use crate::cure_section::PlaceSize;
 use crate::speed::{Simulation, SpeedOptions, times_of};
 
 /// The gap of a plan, as a share of the unplanned error: as `lamp plan speed` has it, since a state is
@@ -103,7 +105,9 @@ pub fn learn(
         (Method::Law(law), PrintMeasurements::Areas(rows)) => {
             from_law(job, print, rows, &law, memory)
         }
-        (Method::Law(_), PrintMeasurements::Heights(_)) => Err(LearnError::LawOfHeights),
+        (Method::Law(_), PrintMeasurements::Heights(_) | PrintMeasurements::Places { .. }) => {
+            Err(LearnError::LawOfHeights)
+        }
     }
 }
 
@@ -265,6 +269,17 @@ fn places_of(job: &Job, measured: &PrintMeasurements) -> Result<Vec<Measurement>
                 Ok(Measurement::Height { layer, pixel, um, sd_um: row.sd_um })
             })
             .collect(),
+        PrintMeasurements::Places { places, table } => {
+            let corner = job.origin_mm().ok_or(LearnError::NoPosition)?;
+            let mut all = table.as_ref().map_or(Ok(Vec::new()), |table| places_of(job, table))?;
+            for place in places.all() {
+                let beside = |problem| LearnError::Place { name: place.name.clone(), problem };
+                let pixels = PlacePixels::of(place, &job.part, corner).map_err(beside)?;
+                let size = place.measured.map_or(0.0, PlaceSize::number);
+                all.push(Measurement::Size { place: pixels, size, sd: sd_of_place(place, size) });
+            }
+            Ok(all)
+        }
     }
 }
 

@@ -4,8 +4,9 @@ use lamp_stack::Length;
 use thiserror::Error;
 
 use crate::column::NoHeights;
-use crate::learn::LearnError;
+use crate::learn::{LearnError, PlaceError};
 use crate::light::LightError;
+use crate::projector::NoFieldLight;
 use crate::resin_light::NoLight;
 use crate::speed::PartError;
 
@@ -43,8 +44,39 @@ pub enum PrintSimError {
     #[error("the truth is impossible: {0}")]
     Truth(LightError),
     /// The model of the job does not have a number of the truth.
-    #[error("the truth has `{0}`, which is not a number of this job's model: leave it out")]
+    #[error("the truth has `{0}`, which is not of this job's model: leave it out")]
     OtherModel(&'static str),
+    /// Two pictures of one light.
+    #[error(
+        "the truth has `flat-field` and `layer-picture`: a picture of a layer shows the flat field, so \
+         state one of them"
+    )]
+    TwoFields,
+    /// A spread besides the picture of spread light.
+    #[error(
+        "the truth has `spread` and `layer-picture`: the picture shows the spread, so leave it out"
+    )]
+    SpreadTwice,
+    /// A picture of one layer for layers that differ.
+    #[error(
+        "the layers' images differ, so no picture of one layer has the light of all: state a \
+         `flat-field` instead"
+    )]
+    LayersDiffer,
+    /// A picture without light.
+    #[error(transparent)]
+    NoFieldLight(#[from] NoFieldLight),
+    /// Images too large for a light of each pixel.
+    #[error(
+        "images of {columns} x {rows} pixels are too large for a picture of their light: 67 million \
+         pixels are the most"
+    )]
+    LargeField {
+        /// Pixels of a row.
+        columns: u32,
+        /// Rows.
+        rows: u32,
+    },
     /// The model of a plan on a glass cannot be computed.
     #[error(transparent)]
     Model(#[from] LearnError),
@@ -75,6 +107,18 @@ pub enum PrintSimError {
         /// The number of places.
         places: usize,
     },
+    /// A place has no size.
+    // No source: this message contains the problem's text.
+    #[error("the place {name}: {problem}")]
+    Place {
+        /// Its name.
+        name: String,
+        /// Why not.
+        problem: PlaceError,
+    },
+    /// There are no places.
+    #[error("there are no places to measure")]
+    NoPlaces,
     /// A standard deviation of heights is not above zero.
     #[error("a standard deviation of {} um is not above zero", .0.um())]
     Deviation(Length),

@@ -23,6 +23,7 @@ impl Truth {
     /// state how deep a dose cures.
     pub fn on_columns(&self, of: &Columns, print: usize) -> Result<GlassChange, PrintSimError> {
         self.check_doses()?;
+        self.check_no_layer()?;
         let (two, curve) = (&of.material.two_depth, &of.material.working_curve);
         let [depth, critical] = match (two, curve) {
             (Some(two), _) => [two.liquid_depth.value.um(), two.critical_dose.value.mj_per_cm2()],
@@ -48,6 +49,10 @@ impl Truth {
     /// Returns an error if a number is impossible, or not of kinetics.
     pub fn on_rings(&self, of: &Rings, print: usize) -> Result<RingChange, PrintSimError> {
         self.check_kinetics()?;
+        self.check_no_layer()?;
+        if self.flat_field.is_some() {
+            return Err(PrintSimError::OtherModel("flat-field"));
+        }
         let (setting, kinetics) = (&of.setting, &of.setting.kinetics);
         // Light fades by e over the inverse of its fading in fresh resin.
         let depth_um = 1.0 / (kinetics.fading() * kinetics.photoinitiator.number());
@@ -63,6 +68,14 @@ impl Truth {
             critical_conversion: self.critical_conversion.factor(),
             spread: factor::<Length>(self.spread, setting.sigma_um, "the spread of light")?,
         })
+    }
+
+    /// Refuses the picture of a layer: bitmaps on a glass differ from one to the next.
+    fn check_no_layer(&self) -> Result<(), PrintSimError> {
+        match self.layer_picture {
+            Some(_) => Err(PrintSimError::OtherModel("layer-picture")),
+            None => Ok(()),
+        }
     }
 
     fn light_factor(&self, light: Intensity, print: usize) -> Result<f64, PrintSimError> {

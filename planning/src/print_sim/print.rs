@@ -6,8 +6,12 @@ use rayon::prelude::*;
 
 use super::error::PrintSimError;
 use super::faces::{FacePlace, random_places};
+use super::field::TrueField;
 use super::truth::Truth;
-use crate::learn::{AreaRow, HeightRow, Job, PrintMeasurements, height_of};
+use crate::cure_section::Places;
+use crate::learn::{
+    AreaRow, HeightRow, Job, PlacePixels, PrintMeasurements, height_of, sd_of_place,
+};
 use crate::light::Light;
 use crate::numeric::Random;
 use crate::speed::{Simulation, Tally, TimedLayer};
@@ -15,6 +19,10 @@ use crate::speed::{Simulation, Tally, TimedLayer};
 /// Places are chosen by the seed alone, so that each print is measured at the same ones. Prints have the
 /// sequences of random numbers from 0 on.
 const PLACES: u64 = u64::MAX;
+
+/// Sizes of places begin at this sequence of random numbers: other measurements have one for each print,
+/// from 0 on.
+const SIZES: u64 = 1 << 32;
 
 /// A print of a job on a machine whose light and resin are known.
 pub struct SimulatedPrint<'a> {
@@ -39,10 +47,11 @@ pub type CuredBody = Vec<Layer>;
 
 impl<'a> SimulatedPrint<'a> {
     /// Prints a job with the times of one of its prints. `material` is the material that the truth
-    /// changes.
+    /// changes, `field` the machine's light, if it is not even.
     ///
     /// # Errors
-    /// Returns an error if the material has no light for doses, or the truth is impossible.
+    /// Returns an error if the material has no light for doses, if the truth is impossible, or if the
+    /// field cannot be the light of this part.
     ///
     /// # Panics
     /// Panics if the job has no such print.
@@ -51,12 +60,21 @@ impl<'a> SimulatedPrint<'a> {
         number: usize,
         material: &Material,
         truth: &Truth,
+        field: Option<&TrueField>,
         memory: u64,
     ) -> Result<Self, PrintSimError> {
         truth.check_doses()?;
         let of_material = Light::of(material, job.light.at)?;
         let light = truth.light(&of_material, number).map_err(PrintSimError::Truth)?;
-        let simulation = Simulation::new(&job.part, &light, memory)?;
+        let simulation = match field {
+            Some(field) => {
+                // The numbers are checked before the light of pixels is computed.
+                light.check_spread(job.part.pitch()).map_err(PrintSimError::Truth)?;
+                let field = field.on(&job.part, &light)?;
+                Simulation::in_field(&job.part, &light, field, memory)?
+            }
+            None => Simulation::new(&job.part, &light, memory)?,
+        };
         let [tally] = simulation.tally([&job.prints[number].times]);
         Ok(Self { job, number, light, simulation, tally })
     }
@@ -141,6 +159,50 @@ impl<'a> SimulatedPrint<'a> {
         Ok(SimulatedHeights { measured: PrintMeasurements::Heights(rows), uncured })
     }
 
+    /// Measures the sizes of places. `sd` is the standard deviation of lengths whose place states none.
+    /// Wanted sizes that are not stated are the part's, as it was sliced.
+    ///
+    /// # Errors
+    /// Returns an error if the job's stack does not state its position, if `sd` is not above zero, or if a
+    /// place has no size.
+    pub fn sizes(
+        &self,
+        places: &Places,
+        sd: Option<Length>,
+        seed: u64,
+    ) -> Result<PrintMeasurements, PrintSimError> {
+        let corner = self.job.origin_mm().ok_or(PrintSimError::NoPosition)?;
+        if let Some(sd) = sd.filter(|sd| !(sd.um() > 0.0 && sd.um().is_finite())) {
+            return Err(PrintSimError::Deviation(sd));
+        }
+        if places.all().is_empty() {
+            return Err(PrintSimError::NoPlaces);
+        }
+        let (part, times) = (&self.job.part, &self.job.prints[self.number].times);
+        let mut random = Random::sequence(seed, SIZES + self.number as u64);
+        let mut measured = Vec::new();
+        for place in places.all() {
+            let beside = |problem| PrintSimError::Place { name: place.name.clone(), problem };
+            let pixels = PlacePixels::of(place, part, corner).map_err(beside)?;
+            let doses: Vec<Vec<f64>> = pixels
+                .pixels()
+                .par_iter()
+                .map(|pixel| self.simulation.doses_at(*pixel, times))
+                .map(|doses| doses.into_iter().map(f64::ln).collect())
+                .collect();
+            let size = pixels.size(part, &self.light, &doses, 0.0);
+            let mut place = place.clone();
+            place.sd = place.sd.or(sd.and_then(|sd| place.length(sd.um())));
+            let sd = sd_of_place(&place, size);
+            place.sd = Some(place.rounded(sd));
+            place.wanted = place.wanted.or(Some(place.rounded(pixels.wanted(part))));
+            // Nothing is smaller than nothing.
+            place.measured = Some(place.rounded((size + sd * random.normal()).max(0.0)));
+            measured.push(place);
+        }
+        Ok(PrintMeasurements::Places { places: Places::of(measured), table: None })
+    }
+
     /// Returns the body as it is cured: a stack of the part's layers, whose images reach as far
     /// beyond the part's images as light spreads. `command` is recorded as its origin.
     ///
@@ -179,9 +241,12 @@ mod tests {
     use lamp_stack::Catalogued;
 
     use super::*;
-    use crate::learn::PrintError;
+    use crate::learn::{Lesson, Method, PrintError, learn};
+    use crate::print_sim::FieldKind;
+    use crate::projector::FieldPicture;
     use crate::speed::Platform;
     use crate::speed::testing::{part, pegda};
+    use crate::target::GrayPicture;
 
     const OFF: &str = "penetration-depth = '+25%'\ncritical-dose = '-15%'\nlight = '+10%'\n";
 
@@ -195,7 +260,152 @@ mod tests {
 
     fn print<'a>(job: &'a Job, truth: &str) -> SimulatedPrint<'a> {
         let truth = Truth::parse(truth).unwrap();
-        SimulatedPrint::new(job, 0, &job.material, &truth, 1 << 30).unwrap()
+        SimulatedPrint::new(job, 0, &job.material, &truth, None, 1 << 30).unwrap()
+    }
+
+    fn picture(columns: usize, levels: &[u16]) -> FieldPicture {
+        let (rows, levels) = (levels.len() / columns, levels.to_vec());
+        FieldPicture::of(&GrayPicture { columns, rows, levels }).unwrap()
+    }
+
+    fn print_in(job: &Job, kind: FieldKind, picture: FieldPicture) -> SimulatedPrint<'_> {
+        let field = TrueField { kind, picture };
+        SimulatedPrint::new(job, 0, &job.material, &Truth::default(), Some(&field), 1 << 30)
+            .unwrap()
+    }
+
+    /// The cured pixels of a layer, the one nearest to the light first, with a rim of 20 pixels, given the
+    /// light of each pixel of each layer before it spreads over `sigma` pixels: sums over all pixels.
+    fn cured(job: &Job, lit: &dyn Fn(usize, [i64; 2]) -> f64, sigma: f64) -> Vec<Vec<bool>> {
+        let [width, height] = job.part.size().map(i64::from);
+        let layers = job.part.layers();
+        let field: f64 = (-60_i64..=60).map(|at| (-0.5 * (at as f64 / sigma).powi(2)).exp()).sum();
+        let weight = |away: i64| (-0.5 * (away as f64 / sigma).powi(2)).exp() / field;
+        let mut doses = vec![0.0; ((width + 40) * (height + 40)) as usize];
+        let mut all = Vec::new();
+        for at in 0..layers.len() {
+            let above_um = if at == 0 { 0.0 } else { layers[at - 1].thickness.um() };
+            let passed = (-above_um / job.light.penetration_depth.um()).exp();
+            let rate = job.light.intensity.mw_per_cm2() / job.light.critical_dose.mj_per_cm2();
+            // Along rows, and then along columns.
+            let across: Vec<f64> = (0..height)
+                .flat_map(|row| (-20..width + 20).map(move |column| [column, row]))
+                .map(|[column, row]| {
+                    (0..width).map(|from| weight(from - column) * lit(at, [from, row])).sum()
+                })
+                .collect();
+            let places = (-20..height + 20)
+                .flat_map(|row| (-20..width + 20).map(move |column| [column, row]));
+            for (dose, [column, row]) in doses.iter_mut().zip(places) {
+                let line = |from: i64| across[(from * (width + 40) + column + 20) as usize];
+                let light: f64 = (0..height).map(|from| weight(from - row) * line(from)).sum();
+                *dose = *dose * passed + rate * job.prints[0].times[at] * light;
+            }
+            all.push(doses.iter().map(|dose| *dose >= 1.0).collect());
+        }
+        all
+    }
+
+    /// Checks counts, the body and doses of single pixels against cured pixels.
+    #[track_caller]
+    fn assert_cured(job: &Job, print: &SimulatedPrint<'_>, cured: &[Vec<bool>]) {
+        let [width, height] = job.part.size();
+        let (mut wrong, mut total) = (0, 0);
+        let body = print.body(String::new()).unwrap();
+        let reach = (body[0].image.width() - width) / 2;
+        for (at, cured) in cured.iter().enumerate() {
+            let (mut over, mut under) = (0, 0);
+            let image = &body[body.len() - 1 - at].image;
+            for (place, is_cured) in cured.iter().enumerate() {
+                let [column, row] = [place as u32 % (width + 40), place as u32 / (width + 40)];
+                let pixel = [column, row].map(|at| at.wrapping_sub(20));
+                let is_wanted = job.part.is_wanted(at, pixel);
+                over += u64::from(*is_cured && !is_wanted);
+                under += u64::from(!*is_cured && is_wanted);
+                let [x, y] = pixel.map(|at| at.wrapping_add(reach));
+                let is_inside = x < image.width() && y < image.height();
+                let is_body = is_inside && image.level(x, y) == 255;
+                wrong += u64::from(is_body != *is_cured);
+                if pixel[0] < width && pixel[1] < height && place % 97 == 0 {
+                    let dose = print.simulation.doses_at(pixel, &job.prints[0].times)[at];
+                    assert_eq!(dose >= 1.0, is_body, "{at} {pixel:?} {dose}");
+                }
+            }
+            total += over + under;
+            let counted = print.tally().layers[at];
+            assert!(counted.over.abs_diff(over) + counted.under.abs_diff(under) <= 2, "{at}");
+        }
+        // Doses of the model have 24 bits.
+        assert!(wrong <= 5 && total > 500, "{wrong} of {total} differ");
+        assert_eq!((height + 40) * (width + 40), cured[0].len() as u32);
+    }
+
+    #[test]
+    fn a_flat_field_is_the_light_of_pixels_before_it_spreads() {
+        let job = job_of(&cavity_staircase(1), 0.25);
+        let [width, height] = job.part.size().map(|count| count as usize);
+        let levels: Vec<u16> = (0..width * height)
+            .map(|at| 20_000 + ((at % width) * 700) as u16 + ((at * 7919) % 9000) as u16)
+            .collect();
+        let mean = levels.iter().map(|level| f64::from(*level)).sum::<f64>() / levels.len() as f64;
+        let shown = print_in(&job, FieldKind::FlatField, picture(width, &levels));
+        let share = |[column, row]: [i64; 2]| {
+            f64::from(levels[row as usize * width + column as usize]) / mean
+        };
+        let lit = |at: usize, pixel: [i64; 2]| {
+            let [column, row] = pixel.map(|at| at as u32);
+            f64::from(u8::from(job.part.is_wanted(at, [column, row]))) * share(pixel)
+        };
+        assert_cured(&job, &shown, &cured(&job, &lit, 0.5));
+        // An even picture of any size and level changes nothing.
+        let even = print_in(&job, FieldKind::FlatField, picture(3, &[777; 6]));
+        assert_eq!(even.tally(), print(&job, "").tally());
+    }
+
+    #[test]
+    fn a_picture_of_a_layer_is_the_light_of_all() {
+        let job = job_of(&square_prism(0), 0.25);
+        let [width, height] = job.part.size().map(|count| count as usize);
+        let lit = |at: usize, [column, row]: [i64; 2]| {
+            f64::from(u8::from(job.part.is_wanted(at, [column as u32, row as u32])))
+        };
+        // A camera sees any light: here a hot spot beside a shade.
+        let level = |at: usize| {
+            let [x, y] = [at % width, at / width].map(|at| at as f64 / width as f64);
+            let spot = (-((x - 0.3).powi(2) + (y - 0.4).powi(2)) / 0.02).exp();
+            (12_000.0 + 30_000.0 * spot - 9_000.0 * x) as u16
+        };
+        let levels: Vec<u16> = (0..width * height).map(level).collect();
+        let print = print_in(&job, FieldKind::Layer, picture(width, &levels));
+        let sum: f64 = levels.iter().map(|level| f64::from(*level)).sum();
+        let white: f64 =
+            (0..width * height).map(|at| lit(0, [(at % width) as i64, (at / width) as i64])).sum();
+        let times = &job.prints[0].times;
+        for pixel in [[0, 0], [width / 3, height / 2], [width - 1, height - 1]] {
+            // 004 A.1: the mean of the picture is the light that the power meter reads.
+            let light = f64::from(levels[pixel[1] * width + pixel[0]]) * white / sum;
+            let doses = print.simulation.doses_at(pixel.map(|at| at as u32), times);
+            let mut expected = 0.0;
+            for (dose, (layer, time)) in doses.iter().zip(job.part.layers().iter().zip(times)) {
+                // All layers of the prism are equally thick (004 eq. 2.5).
+                expected *= (-layer.thickness.um() / job.light.penetration_depth.um()).exp();
+                expected += 7.394 / 7.266 * time * light;
+                assert!((dose / expected - 1.0).abs() < 1e-5, "{pixel:?} {dose} {expected}");
+            }
+        }
+        let wanted = print.tally().wanted.iter().sum::<u64>();
+        assert_eq!(wanted, white as u64 * job.part.layers().len() as u64);
+        let stairs = job_of(&cavity_staircase(1), 0.25);
+        let field = TrueField { kind: FieldKind::Layer, picture: picture(1, &[1]) };
+        let refused = SimulatedPrint::new(
+            &stairs,
+            0,
+            &stairs.material,
+            &Truth::default(),
+            Some(&field),
+            1 << 30,
+        );
+        assert_eq!(refused.err(), Some(PrintSimError::LayersDiffer));
     }
 
     #[test]
@@ -203,7 +413,7 @@ mod tests {
         let job = job_of(&cavity_staircase(1), 0.25);
         let exact = print(&job, OFF);
         let counts = exact.areas(0.0, 1);
-        assert_eq!(PrintMeasurements::parse(&counts.to_csv()).unwrap(), counts);
+        assert_eq!(PrintMeasurements::parse(&counts.to_text()).unwrap(), counts);
         assert_eq!(counts.error(), PrintError::Pixels(exact.tally().wrong().sum() as f64));
         let PrintMeasurements::Areas(rows) = &counts else { panic!("these are counts") };
         let lowest = exact.tally().layers.last().unwrap();
@@ -216,7 +426,8 @@ mod tests {
         job.prints.push(job.prints[0].clone());
         let truth = Truth::parse(OFF).unwrap();
         let of = |number, seed| {
-            let print = SimulatedPrint::new(&job, number, &job.material, &truth, 1 << 30).unwrap();
+            let print =
+                SimulatedPrint::new(&job, number, &job.material, &truth, None, 1 << 30).unwrap();
             print.areas(0.02, seed)
         };
         assert_eq!(of(0, 1), of(0, 1));
@@ -246,7 +457,7 @@ mod tests {
         assert_eq!((exact.uncured, exact), (0, of(0.001)));
         let rows = |heights: SimulatedHeights| match heights.measured {
             PrintMeasurements::Heights(rows) => rows,
-            PrintMeasurements::Areas(_) => panic!("these are heights"),
+            _ => panic!("these are heights"),
         };
         let (exact, noisy) = (rows(of(0.001)), rows(noisy));
         assert_eq!(exact.len(), 200);
@@ -264,7 +475,89 @@ mod tests {
         let sd = (squares / 200.0).sqrt();
         assert!((17.0..23.0).contains(&sd), "{sd}");
         let table = PrintMeasurements::Heights(noisy);
-        assert_eq!(PrintMeasurements::parse(&table.to_csv()).unwrap(), table);
+        assert_eq!(PrintMeasurements::parse(&table.to_text()).unwrap(), table);
+    }
+
+    /// Lines and a box on the staircase, whose images begin at (0, 0) mm.
+    const PLACES: &str = "
+        place = [
+            { name = 'roof', x = '2.05mm', y = '-1.55mm', z = ['0mm', '3.333mm'] },
+            { name = 'step', x = '4.05mm', y = '-1.55mm' },
+            { name = 'end', x = '3.55mm', y = '-1.55mm', sd = '4um' },
+            { name = 'wide', y = '-1.55mm', z = '5.03mm' },
+            { name = 'deep', x = '2.05mm', z = '5.01mm' },
+            { name = 'corner', x = ['0.2mm', '1mm'], y = ['-1.3mm', '-0.2mm'], z = ['0mm', '2.5mm'] },
+        ]";
+
+    #[test]
+    fn sizes_of_places_have_their_noise() {
+        let job = job_of(&cavity_staircase(1), 0.25);
+        let print = print(&job, OFF);
+        let places = Places::parse(PLACES).unwrap();
+        let of = |um: Option<f64>, seed: u64| {
+            let sd = um.map(Length::from_um);
+            let sizes = print.sizes(&places, sd, seed).unwrap();
+            assert_eq!(PrintMeasurements::parse(&sizes.to_text()).unwrap(), sizes);
+            let PrintMeasurements::Places { places, .. } = sizes else {
+                panic!("these are places")
+            };
+            places.all().to_vec()
+        };
+        assert_eq!(of(Some(5.0), 1), of(Some(5.0), 1));
+        let exact = of(Some(0.001), 1);
+        let trials: Vec<_> = (0..400).map(|seed| of(None, seed)).collect();
+        let deviation = |at: usize| {
+            let sizes = || trials.iter().map(|places| places[at].measured.unwrap().number());
+            let mean = sizes().sum::<f64>() / 400.0;
+            (sizes().map(|size| (size - mean).powi(2)).sum::<f64>() / 400.0).sqrt()
+        };
+        let volume = exact[5].measured.unwrap().number();
+        // The usual 20 um, what the file states, and 2 % of a volume.
+        for (at, expected) in [(0, 20.0), (2, 4.0), (5, 0.02 * volume)] {
+            let ratio = deviation(at) / expected;
+            assert!((0.88..1.12).contains(&ratio), "{at}: {ratio}");
+        }
+        let beside = Places::parse("place = [{ name = 'p', x = '99mm', y = '0mm' }]").unwrap();
+        let refused = print.sizes(&beside, None, 1).unwrap_err().to_string();
+        assert_eq!(refused, "the place p: it is outside the stack's images");
+        let none = Places::parse("place = []").unwrap();
+        assert_eq!(print.sizes(&none, None, 1), Err(PrintSimError::NoPlaces));
+    }
+
+    #[test]
+    fn sizes_of_places_teach_the_state() {
+        let job = job_of(&cavity_staircase(1), 0.25);
+        let print = print(&job, OFF);
+        let places = Places::parse(PLACES).unwrap();
+        let truth = [1.25, 1.1 / 0.85, 1.0];
+        let learned = |measured: &PrintMeasurements| {
+            let learned = learn(&job, 0, measured, Method::State, 1 << 28).unwrap();
+            let Lesson::State(lesson) = learned.lesson else { panic!("this is a state") };
+            lesson.after.factors()
+        };
+        let (mut held, trials) = ([0; 3], 4);
+        let mut widths = [0.0; 3];
+        for seed in 0..trials {
+            let measured = print.sizes(&places, Some(Length::from_um(5.0)), seed).unwrap();
+            let factors = learned(&measured);
+            for (at, (factor, truth)) in factors.into_iter().zip(truth).enumerate() {
+                let [low, high] = factor.interval();
+                held[at] += usize::from((low..high).contains(&truth));
+                widths[at] += factor.sd / trials as f64;
+            }
+        }
+        // Of intervals that hold 95 %, fewer than 3 of 4 hold once in 70 tries.
+        assert!(held.iter().all(|held| *held >= 3), "{held:?} {widths:?}");
+        assert!(widths[0] < 0.05 && widths[1] < 0.1, "{widths:?}");
+        // Together with counts, the state is known better than by either.
+        let measured = print.sizes(&places, Some(Length::from_um(5.0)), 1).unwrap();
+        let counts = print.areas(0.02, 1);
+        let text = PrintMeasurements::joined([&counts.to_text(), &measured.to_text()]).unwrap();
+        let joint = PrintMeasurements::parse(&text).unwrap();
+        assert_eq!(PrintMeasurements::parse(&joint.to_text()).unwrap(), joint);
+        assert_eq!(joint.error(), counts.error());
+        let sds = [&measured, &counts, &joint].map(|all| learned(all)[0].sd);
+        assert!(sds[2] < sds[0] && sds[2] < 1.05 * sds[1], "{sds:?}");
     }
 
     #[test]

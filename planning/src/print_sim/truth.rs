@@ -8,6 +8,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
 use super::error::{PrintSimError, TruthError};
+use super::field::FieldKind;
 use crate::light::{IntensityOf, Light, LightError};
 
 /// How a machine and its resin differ from the numbers of a material.
@@ -42,6 +43,10 @@ pub struct Truth {
     pub critical_conversion: Change,
     /// The change of the light from each print to the next.
     pub drift: Change,
+    /// The file of a picture of the light of a wide white field.
+    pub flat_field: Option<String>,
+    /// The file of a camera's picture of the light of a layer, which all layers have.
+    pub layer_picture: Option<String>,
 }
 
 /// A change of a number, as the factor that it is multiplied by: `+25%` is 1.25.
@@ -138,6 +143,22 @@ impl Truth {
             None => TruthError::Syntax { line, problem },
             Some(_) => TruthError::Key { line, problem },
         })
+    }
+
+    /// Returns the file of the picture that is the light, and the kind of the picture.
+    ///
+    /// # Errors
+    /// Returns an error if there are two, or if the truth states the spread that a picture shows.
+    pub fn field_file(&self) -> Result<Option<(FieldKind, &str)>, PrintSimError> {
+        match (&self.flat_field, &self.layer_picture) {
+            (Some(_), Some(_)) => Err(PrintSimError::TwoFields),
+            (None, Some(_)) if self.spread != TrueNumber::default() => {
+                Err(PrintSimError::SpreadTwice)
+            }
+            (Some(word), None) => Ok(Some((FieldKind::FlatField, word))),
+            (None, Some(word)) => Ok(Some((FieldKind::Layer, word))),
+            (None, None) => Ok(None),
+        }
     }
 
     /// Refuses the numbers that only kinetics have.

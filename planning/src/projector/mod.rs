@@ -10,6 +10,7 @@
 //! ```
 
 mod camera;
+mod field_picture;
 mod file;
 mod lens;
 
@@ -19,6 +20,7 @@ use lamp_stack::{Length, nonempty_text};
 use serde::{Deserialize, Serialize};
 
 pub use camera::{CameraDoubt, CameraError, CameraFit, CameraPicture};
+pub use field_picture::{FieldPicture, NoFieldLight};
 pub use file::ProjectorError;
 pub use lens::{Focus, Lens};
 

@@ -20,9 +20,19 @@ pub(crate) struct Gather<'a> {
     /// The light of each level, scaled so that a wide white field has 1.
     light_of: Vec<f32>,
     taps: WindowTaps,
+    /// The machine's own light, if it differs from the images.
+    field: Option<LightField>,
     side: usize,
     /// The rows and columns where any layer is not black, and around them as far as light spreads.
     tiles: Vec<[i64; 2]>,
+}
+
+/// The light of a machine, a number for each pixel of the part's images, row by row.
+pub(crate) enum LightField {
+    /// Each pixel's light, before it spreads, as a share of its level's light.
+    Shares(Vec<f32>),
+    /// The light of all layers, after it spread, where a wide white field has 1.
+    Picture(Vec<f32>),
 }
 
 /// The weights of the pixels around one, from the first that matters to the last.
@@ -58,12 +68,18 @@ struct TileRoom {
     /// The levels whose light is known.
     spread_levels: Vec<u8>,
     image: Vec<f32>,
+    field: Vec<f32>,
     spread: Vec<f32>,
     blur: Vec<f32>,
 }
 
 impl<'a> Gather<'a> {
     pub(crate) fn new(part: &'a TimedPart, light: &Light) -> Self {
+        Self::in_field(part, light, None)
+    }
+
+    /// As [`new`](Self::new), in a machine's light.
+    pub(crate) fn in_field(part: &'a TimedPart, light: &Light, field: Option<LightField>) -> Self {
         let blur = Blur::<f32>::of_scan(part.spread_pixels(light));
         let sum = blur.sum();
         let light_of = (0..=255).map(|level| (light.of_level(level) / sum) as f32).collect();
@@ -73,7 +89,7 @@ impl<'a> Gather<'a> {
         let fits = |&side: &usize| side <= 4 * blur.radius() && bytes(side) <= MOST_TILE_BYTES;
         let side = SIDES.into_iter().rev().find(fits).unwrap_or(SIDES[0]);
         let taps = WindowTaps::of(&blur);
-        let mut gather = Self { part, blur, light_of, taps, side, tiles: Vec::new() };
+        let mut gather = Self { part, blur, light_of, taps, field, side, tiles: Vec::new() };
         gather.tiles = gather.lit_tiles();
         gather
     }
@@ -84,7 +100,8 @@ impl<'a> Gather<'a> {
         let [width, height] = self.part.size().map(i64::from);
         let corners = |size: i64| (-radius..size + radius).step_by(self.side);
         let (across, down) = (corners(width).count(), corners(height).count());
-        let mut lit = vec![false; across * down];
+        // A picture may have light wherever it reaches.
+        let mut lit = vec![matches!(self.field, Some(LightField::Picture(_))); across * down];
         let tile = |pixel: i64| ((pixel + radius) / self.side as i64) as usize;
         for image in &self.part.images {
             for row in 0..image.height() {
@@ -144,6 +161,11 @@ impl<'a> Gather<'a> {
             }
             step *= 2;
         }
+    }
+
+    /// Returns the columns of all pixels, if they take no more than `bytes`.
+    pub(crate) fn all_in(&self, bytes: usize) -> Option<PixelColumns> {
+        self.all(bytes / (self.part.images.len() * size_of::<f32>()))
     }
 
     /// Returns the columns of all pixels, if there are at most `most`.
@@ -314,9 +336,15 @@ impl<'a> Gather<'a> {
             return false;
         }
         room.spread_levels.clone_from(&room.levels);
+        if let Some(LightField::Picture(light)) = &self.field {
+            // The picture was taken of light that had spread.
+            room.spread.resize(pixels, 0.0);
+            self.fill_field(light, corner, window.width(), &mut room.spread);
+            return true;
+        }
         let first = room.levels[0];
         // Inside and outside of the part, the blur is a known sum.
-        if room.levels.iter().all(|&level| level == first) {
+        if self.field.is_none() && room.levels.iter().all(|&level| level == first) {
             let field = self.light_of[usize::from(first)] * self.taps.field;
             room.spread.clear();
             room.spread.resize(pixels, field);
@@ -324,9 +352,28 @@ impl<'a> Gather<'a> {
         }
         room.image.clear();
         room.image.extend(room.levels.iter().map(|&level| self.light_of[usize::from(level)]));
+        if let Some(LightField::Shares(shares)) = &self.field {
+            room.field.resize(pixels, 0.0);
+            self.fill_field(shares, corner, window.width(), &mut room.field);
+            room.image.iter_mut().zip(&room.field).for_each(|(light, share)| *light *= share);
+        }
         room.spread.resize(pixels, 0.0);
         self.blur.apply(&room.image, window.width(), &mut room.spread, &mut room.blur);
         true
+    }
+
+    /// Writes the numbers of a window's pixels, row by row: 0 outside the part's images.
+    fn fill_field(&self, numbers: &[f32], [column, row]: [i64; 2], width: usize, out: &mut [f32]) {
+        out.fill(0.0);
+        let [columns, rows] = self.part.size().map(i64::from);
+        let (from, to) = (column.clamp(0, columns), (column + width as i64).clamp(0, columns));
+        for (row, line) in (row..).zip(out.chunks_exact_mut(width)) {
+            if (0..rows).contains(&row) && from < to {
+                let [first, end] = [from, to].map(|at| (row * columns + at) as usize);
+                line[(from - column) as usize..(to - column) as usize]
+                    .copy_from_slice(&numbers[first..end]);
+            }
+        }
     }
 
     /// Computes the columns of one tile. Columns without light are left out.

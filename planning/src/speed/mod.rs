@@ -18,6 +18,7 @@ mod times_table;
 
 pub(crate) use dose_curve::DoseGrid;
 pub use feasible::{Platform, PlatformError, Speed};
+pub(crate) use gather::LightField;
 pub use part::{PartError, PartPages, TimedLayer, TimedPart};
 pub(crate) use plan::times_of;
 pub use plan::{SPEED_CODE, SearchStage, SpeedOptions, SpeedPlan, SpeedPlanError, plan};

@@ -126,6 +126,12 @@ impl TimedPart {
         [self.images[0].width(), self.images[0].height()]
     }
 
+    /// Returns the image of all layers, if they are alike.
+    pub(crate) fn only_image(&self) -> Option<&Image> {
+        let first = &self.images[0];
+        self.images.iter().all(|image| image == first).then_some(first)
+    }
+
     /// Returns whether a pixel of a layer belongs to the part. Pixels outside the image do not.
     pub fn is_wanted(&self, layer: usize, [column, row]: [u32; 2]) -> bool {
         let [width, height] = self.size();

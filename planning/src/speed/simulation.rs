@@ -2,9 +2,9 @@
 
 use lamp_stack::Mask;
 
-use super::columns::PixelColumns;
+use super::columns::{ColumnSet, PixelColumns};
 use super::dose_curve::{DoseCurves, DoseGrid};
-use super::gather::Gather;
+use super::gather::{Gather, LightField};
 use super::part::{PartError, TimedPart};
 use super::tally::{GradualWrong, Tally, gradual_wrong};
 use crate::blur::Blur;
@@ -47,6 +47,23 @@ impl<'a> Simulation<'a> {
         let gather = Gather::new(part, light);
         let bytes = (memory / COLUMNS_SHARE).min(MOST_COLUMN_BYTES);
         let (columns, sampled) = gather.columns(bytes as usize, least.isqrt());
+        Ok(Self { gather, layers, columns, sampled })
+    }
+
+    /// Prepares a part as [`new`](Self::new) does, in a machine's light. No search sees its columns.
+    pub(crate) fn in_field(
+        part: &'a TimedPart,
+        light: &Light,
+        field: LightField,
+        memory: u64,
+    ) -> Result<Self, PartError> {
+        let layers = reaches(part, light)?;
+        let gather = Gather::in_field(part, light, Some(field));
+        let bytes = (memory / COLUMNS_SHARE).min(MOST_COLUMN_BYTES);
+        let (columns, sampled) = match gather.all_in(bytes as usize) {
+            Some(all) => (all, 1),
+            None => (ColumnSet::new(layers.len()).finish(), 0),
+        };
         Ok(Self { gather, layers, columns, sampled })
     }
 
@@ -158,7 +175,7 @@ impl<'a> Simulation<'a> {
         &self.columns
     }
 
-    /// Returns the number of pixels that each column of a search stands for.
+    /// Returns the number of pixels that each column of a search stands for: 0 if it has none.
     pub(crate) fn sampled(&self) -> u32 {
         self.sampled
     }

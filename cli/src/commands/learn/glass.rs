@@ -106,7 +106,7 @@ fn run_of<S: GlassSettings>(
     if args.law.is_some() {
         return Err(Exit::usage("--law is for jobs of stacks: leave it out"));
     }
-    args.check_outputs(measured)?;
+    args.check_outputs()?;
     let mut job = GlassJob::<S>::open(&args.job)?;
     let next = plan_folder(output, false)?;
     let name = input_name(measured);
@@ -167,7 +167,7 @@ fn read<S: GlassSettings>(
     match (args.pixel.zip(args.full), extension(path).as_str()) {
         (Some((pixel, full)), "png") => {
             let map = job.measured_map(path, MapScale { pixel, full })?;
-            let text = map.to_csv();
+            let text = map.to_text();
             Ok((map, text))
         }
         (None, "png") => Err(Exit::usage(

@@ -40,7 +40,7 @@ const MAX_TABLE: u64 = 64 << 20;
 /// prints. Begin a job with a stack that has exposure times, print it, and give your measurements:
 /// the heights of downward faces, or the wrongly cured pixels of each layer. The command finds the
 /// state of light and resin that all prints show, plans the times again for that state, and writes
-/// them for the next print.
+/// them for the next print. Sizes of named places are measurements, too.
 ///
 /// A job can also begin with the folder of lamp plan column-cure or lamp plan ecpl. Its measurements
 /// are heights on the glass, as a table or as a height map, and the next print is another such folder.
@@ -49,6 +49,7 @@ const MAX_TABLE: u64 = 64 << 20;
 Examples:
   lamp learn job/ --start timed.tif --material mine.toml
   lamp learn job/ --measured heights.csv -o next.csv
+  lamp learn job/ --measured areas.csv --measured places.toml -o next.csv
   lamp learn job/ --measured areas.csv --law single --gain 6e-6 --plot learn.svg -o next.csv
   lamp learn job/ --start plan/ --material mine.toml --projector zhao
   lamp learn job/ --measured map.png --pixel 10um --full 500um -o next/")]
@@ -66,9 +67,10 @@ pub(crate) struct LearnArgs {
     kept: KeptOptions,
 
     /// Measurements of a print: x_mm, y_mm, z_mm, measured_mm and sd_um, or layer, over_px and
-    /// under_px; of a part on a glass also a PNG height map
+    /// under_px, or a TOML file of places that states what is measured. Twice for a table and places of
+    /// the same print. Of a part on a glass also a PNG height map
     #[arg(long, value_name = "FILE", requires = "output")]
-    measured: Option<PathBuf>,
+    measured: Vec<PathBuf>,
 
     /// Side of a measured height map's pixels on the glass
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
@@ -185,7 +187,7 @@ impl LearnArgs {
 
 pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     let progress = Progress::new("learn", common, true);
-    if args.report.path().is_some() && args.measured.is_none() {
+    if args.report.path().is_some() && args.measured.is_empty() {
         return Err(Exit::usage("--report and --json are of a print that was --measured"));
     }
     if let Some(stack) = &args.start {
@@ -204,12 +206,15 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
         }
         return begin::begin(&args.job, stack, material, &args.kept, &progress);
     }
-    let (Some(measured), Some(output)) = (&args.measured, &args.output) else {
+    let ([_, ..], Some(output)) = (&args.measured[..], &args.output) else {
         return Err(Exit::usage(
             "begin a job with --start STACK --material M, or give what was --measured",
         ));
     };
     if let Some(kind) = job_kind(&args.job) {
+        let [measured] = &args.measured[..] else {
+            return Err(Exit::usage("give --measured once: a plan on a glass has heights alone"));
+        };
         return glass::run(kind, args, measured, output, &progress);
     }
     if args.pixel.is_some() {
@@ -221,11 +226,10 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     if is_stream(output) {
         return Err(Exit::usage("name a file for the next profile, such as -o next.csv"));
     }
-    args.check_outputs(measured)?;
+    args.check_outputs()?;
     let memory = args.memory.unwrap_or_else(|| memory::available() / 4);
     let mut job = open(&args.job, &progress)?;
-    let name = input_name(measured);
-    let (measured, text) = read_measured(measured)?;
+    let (measured, text, name) = args.read_all_measured()?;
     let last = job.prints.len() - 1;
     // A run that was cut off is called again with the same table: it must not count as one more
     // print.
@@ -297,16 +301,39 @@ fn read_measured(path: &Path) -> Result<(PrintMeasurements, String), Exit> {
 }
 
 impl LearnArgs {
-    fn check_outputs(&self, measured: &Path) -> Result<(), Exit> {
+    /// Reads all that was measured, its text, and its name for messages.
+    fn read_all_measured(&self) -> Result<(PrintMeasurements, String, String), Exit> {
+        let (one, other) = match &self.measured[..] {
+            [one] => {
+                let (measured, text) = read_measured(one)?;
+                return Ok((measured, text, input_name(one)));
+            }
+            [one, other] => (one, other),
+            _ => return Err(Exit::usage("give --measured once, or twice with a file of places")),
+        };
+        if is_stream(one) && is_stream(other) {
+            return Err(Exit::usage("standard input has one of both: name a file for the other"));
+        }
+        let [first, second] = [read_measured(one)?, read_measured(other)?];
+        let names = format!("{} and {}", input_name(one), input_name(other));
+        let Some(text) = PrintMeasurements::joined([&first.1, &second.1]) else {
+            return Err(Exit::usage(format!(
+                "{names}: of two files, one is a table and the other has places"
+            )));
+        };
+        let measured = PrintMeasurements::parse(&text);
+        Ok((measured.with_context(|| names.clone())?, text, names))
+    }
+
+    fn check_outputs(&self) -> Result<(), Exit> {
         if let Some(plot) = &self.plot {
             plots::check_name(plot)?;
         }
         let files: Vec<_> =
             self.output.iter().chain(self.report.path()).chain(&self.plot).collect();
-        let measured = measured.to_owned();
         for (number, path) in files.iter().enumerate() {
             check_outside_job(&self.job, path)?;
-            let others = std::iter::once(&measured).chain(files[..number].iter().copied());
+            let others = self.measured.iter().chain(files[..number].iter().copied());
             check_beside(path, Path::new("-"), others)?;
         }
         Ok(())

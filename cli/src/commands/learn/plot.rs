@@ -91,7 +91,7 @@ fn course(errors: &[Option<PrintError>]) -> Vec<Plot> {
     let is_of_areas = |error| matches!(error, PrintError::Pixels(_));
     let is_of_heights = |error| matches!(error, PrintError::Micrometers(_));
     let areas = of("Wrong pixels of each print", "pixels", is_of_areas);
-    let heights = of("Errors of heights, root mean square", "error (µm)", is_of_heights);
+    let heights = of("Errors of heights or places, root mean square", "error (µm)", is_of_heights);
     areas.into_iter().chain(heights).collect()
 }
 
@@ -122,8 +122,16 @@ fn state_plot(names: &[&str], of_prints: &[Option<Vec<Factor>>]) -> Option<Plot>
     (!states.is_empty()).then_some(Plot { title, x, y, series })
 }
 
+/// The table of a print, which may have sizes of places as well.
+fn table_of(print: &JobPrint) -> Option<&PrintMeasurements> {
+    match &print.measured.as_ref()?.0 {
+        PrintMeasurements::Places { table, .. } => table.as_deref(),
+        measured => Some(measured),
+    }
+}
+
 fn areas(job: &Job, number: usize, print: &JobPrint, count: Count) -> Option<Series> {
-    let (PrintMeasurements::Areas(rows), _) = print.measured.as_ref()? else { return None };
+    let PrintMeasurements::Areas(rows) = table_of(print)? else { return None };
     let layers = job.part.layers().iter().rev();
     let place = |layer: &TimedLayer| {
         let row = rows.iter().find(|row| row.layer == layer.index)?;
@@ -133,7 +141,7 @@ fn areas(job: &Job, number: usize, print: &JobPrint, count: Count) -> Option<Ser
 }
 
 fn heights(number: usize, print: &JobPrint) -> Option<Series> {
-    let (PrintMeasurements::Heights(rows), _) = print.measured.as_ref()? else { return None };
+    let PrintMeasurements::Heights(rows) = table_of(print)? else { return None };
     let mut points: Vec<_> =
         rows.iter().map(|row| (row.z_mm, 1000.0 * (row.measured_mm - row.z_mm))).collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));

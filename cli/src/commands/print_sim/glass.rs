@@ -1,5 +1,7 @@
 //! Prints a plan of bitmaps on a glass on a simulated machine, and measures its heights.
 
+use std::path::Path;
+
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::Quantity;
 use lamp_pipeline::glass::{ColumnCureSettings, EcplSettings, GlassJob, GlassKind, GlassSettings};
@@ -92,10 +94,14 @@ pub(super) fn run(
     truth: &Truth,
     truth_name: String,
     material: Option<Material>,
+    field: Option<&Path>,
     progress: &Progress,
 ) -> Result<(), Exit> {
     if args.body.is_some() {
         return Err(Exit::usage("--body is for jobs of stacks: leave it out"));
+    }
+    if args.places.is_some() {
+        return Err(Exit::usage("--places is for jobs of stacks: leave it out"));
     }
     let at_truth = |error: PrintSimError| Exit::Failed(error.into()).at(truth_name);
     match kind {
@@ -103,7 +109,12 @@ pub(super) fn run(
             let run = GlassRun::<ColumnCureSettings>::new(args, material, progress)?;
             let change = truth.on_columns(&run.of, run.number).map_err(at_truth)?;
             let plant = run.of.changed(&change);
-            let printed = run.print(&plant)?;
+            let light = &run.job.prints[run.number].light;
+            let light = match field {
+                Some(field) => &run.job.settings().in_field(&plant, light, field)?,
+                None => light,
+            };
+            let printed = run.print(&plant, light)?;
             let (SpreadOf::Cone(spread) | SpreadOf::Gaussian(spread)) = plant.projector.spread();
             let answer = PrintSimColumnsAnswer {
                 material: &run.material.name,
@@ -120,7 +131,7 @@ pub(super) fn run(
             let run = GlassRun::<EcplSettings>::new(args, material, progress)?;
             let change = truth.on_rings(&run.of, run.number).map_err(at_truth)?;
             let plant = run.of.changed(&change);
-            let printed = run.print(&plant)?;
+            let printed = run.print(&plant, &run.job.prints[run.number].light)?;
             let answer = PrintSimRingsAnswer {
                 material: &run.material.name,
                 projector: &run.job.projector.name,
@@ -170,13 +181,16 @@ impl<'a, S: GlassSettings> GlassRun<'a, S> {
     }
 
     /// Prints with the numbers of a machine, and writes the measured heights.
-    fn print(&self, plant: &S::Model) -> Result<PrintedHeights, Exit> {
+    fn print(
+        &self,
+        plant: &S::Model,
+        light: &<S::Model as GlassModel>::Light,
+    ) -> Result<PrintedHeights, Exit> {
         let Self { args, number, .. } = *self;
-        let light = &self.job.prints[number].light;
         let at_job = |error: PrintSimError| Exit::Failed(error.into()).at(input_name(&args.job));
         let printed = GlassPrint::new(plant, light, number, args.heights, self.sd, args.seed)
             .map_err(at_job)?;
-        let table = printed.measured.to_csv();
+        let table = printed.measured.to_text();
         match is_stream(&args.output) {
             true => print(&table)?,
             false => write_file(&args.output, |out| out.write_all(table.as_bytes()))?,

@@ -8,19 +8,21 @@ use anyhow::Context;
 use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_pipeline::documents::{document, is_file, own_file};
-use lamp_pipeline::glass::job_kind;
+use lamp_pipeline::glass::{field_picture, job_kind};
 use lamp_pipeline::heights::significant;
 use lamp_pipeline::memory;
+use lamp_planning::cure_section::Places;
 use lamp_planning::learn::{PrintError, PrintMeasurements};
-use lamp_planning::print_sim::{PrintSimError, SimulatedPrint, Truth};
+use lamp_planning::print_sim::{PrintSimError, SimulatedPrint, TrueField, Truth};
 use lamp_stack::Length;
 use serde::Serialize;
 
 use crate::args::options::{Common, Output, parse_count};
 use crate::catalogue::read_text;
+use crate::commands::cure::read_places;
 use crate::commands::learn::{check_outside_job, open};
 use crate::exit::Exit;
-use crate::output::endings::parse_table;
+use crate::output::endings::{parse_measured, parse_table, parse_toml};
 use crate::output::json_report::{print_answer, schemas};
 use crate::output::numbers::{grouped, number_of};
 use crate::streams::{
@@ -39,8 +41,8 @@ const MOST_PLACES: usize = 10_000;
 ///
 /// The machine prints the last print of a job of lamp learn with a truth of its own: light and
 /// resin that differ from the job's material. Its measurements are the table that lamp learn
-/// --measured reads: the wrong pixels of each layer, or with --heights the heights of faces that
-/// look down. So the whole loop of printing and learning runs without a machine.
+/// --measured reads: the wrong pixels of each layer, with --heights the heights of faces that
+/// look down, or with --places the sizes of named places. So the whole loop of printing and learning runs without a machine.
 ///
 /// A job of column cure or ecpl is measured by the heights of columns on the glass: of all, or with
 /// --heights of that many random ones.
@@ -48,12 +50,14 @@ const MOST_PLACES: usize = 10_000;
 /// A truth is a TOML file. Each key is a change, such as "+25%", or a value: penetration-depth,
 /// critical-dose, light, spread; for ecpl oxygen and critical-conversion instead of critical-dose;
 /// drift is the change of the light from print to print. Left out keys are as in the job's material,
-/// or as in another one that the key material names.
+/// or as in another one that the key material names. The key flat-field names a picture (PNG) of the
+/// light of a wide white field, layer-picture a camera's picture of the light of a layer.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp print-sim job/ --truth plant.toml --noise 2% -o measured.csv
   lamp print-sim job/ --truth plant.toml --heights 1000 --noise 2um -o heights.csv
+  lamp print-sim job/ --places places.toml --noise 5um -o measured.toml
   lamp print-sim job/ --body printed.tif -o measured.csv
   lamp print-sim columns/ --truth plant.toml --noise 1um -o heights.csv")]
 pub(crate) struct PrintSimArgs {
@@ -74,8 +78,14 @@ pub(crate) struct PrintSimArgs {
     #[arg(long, value_name = "N", value_parser = parse_places)]
     heights: Option<usize>,
 
-    /// Standard deviation of the measurements: of counts a share of each, such as 2%, of heights a
-    /// length, such as 2um [default: 0% of counts, 20um of heights, 1um of columns]
+    /// Measure the sizes of named places instead, a TOML file as lamp cure --places reads it: the
+    /// output is such a file
+    #[arg(long, value_name = "PLACES.toml", conflicts_with = "heights")]
+    places: Option<PathBuf>,
+
+    /// Standard deviation of the measurements: of counts a share of each, such as 2%, of heights and
+    /// lengths of places a length, such as 2um [default: 0% of counts, 20um of heights and lengths,
+    /// 2% of volumes, 1um of columns]
     #[arg(long, value_name = "NOISE", value_parser = parse_noise)]
     noise: Option<Noise>,
 
@@ -88,7 +98,7 @@ pub(crate) struct PrintSimArgs {
     body: Option<PathBuf>,
 
     /// Where to write the measurements: a file, or - for standard output
-    #[arg(short, long, value_name = "MEASURED.csv", default_value = "-", value_parser = parse_table)]
+    #[arg(short, long, value_name = "MEASURED", default_value = "-", value_parser = parse_measured)]
     output: PathBuf,
 
     /// Print the true light and the print's errors as JSON, as docs/json.md describes it
@@ -127,11 +137,12 @@ struct PrintSimAnswer<'a> {
     over_px: u64,
     /// Pixels of the part in all layers that are not cured, exactly.
     under_px: u64,
-    /// Measured wrong pixels of all layers, with noise, or null with heights.
+    /// Measured wrong pixels of all layers, with noise, or null with heights or places.
     measured_px: Option<f64>,
-    /// Root mean square by which measured heights are off, in micrometers, or null without heights.
+    /// Root mean square by which measured heights or sizes of places are off, in micrometers (a volume
+    /// counts as the side of its cube), or null without them.
     rms_um: Option<f64>,
-    /// Places of heights, or null without heights.
+    /// Number of heights or places, or null without them.
     places: Option<usize>,
     /// Places that have no height since nothing is cured there, or null without heights.
     uncured_places: Option<usize>,
@@ -155,24 +166,37 @@ pub(crate) fn run(args: &PrintSimArgs, common: &Common) -> Result<(), Exit> {
     };
     let material = truth.material.as_deref().map(|word| document(&args.beside_truth(word)));
     let material: Option<Material> = material.transpose()?;
-    if let Some(kind) = job_kind(&args.job) {
-        return glass::run(kind, args, &truth, truth_name, material, &progress);
+    let failed = |error: PrintSimError| Exit::Failed(error.into());
+    let field = truth.field_file().map_err(|error| failed(error).at(truth_name.clone()))?;
+    let field = field.map(|(kind, word)| (kind, args.truth_folder().join(word)));
+    if let Some((_, file)) = &field {
+        for output in std::iter::once(&args.output).chain(&args.body) {
+            check_not_input(output, [file])?;
+        }
     }
+    if let Some(kind) = job_kind(&args.job) {
+        let field = field.as_ref().map(|(_, file)| file.as_path());
+        return glass::run(kind, args, &truth, truth_name, material, field, &progress);
+    }
+    let read = |(kind, file): (_, PathBuf)| -> Result<_, Exit> {
+        Ok(TrueField { kind, picture: field_picture(&file)? })
+    };
+    let field = field.map(read).transpose()?;
     args.check_noise()?;
+    let places = args.places.as_deref().map(read_places).transpose()?;
     let job = open(&args.job, &progress)?;
     let number = job.print_of(args.print)?;
     let material = material.unwrap_or_else(|| job.material.clone());
     let memory = memory::available() / 4;
-    let failed = |error: PrintSimError| Exit::Failed(error.into());
-    let simulated = SimulatedPrint::new(&job, number, &material, &truth, memory)
+    let simulated = SimulatedPrint::new(&job, number, &material, &truth, field.as_ref(), memory)
         .map_err(|error| failed(error).at(truth_name))?;
     let at_job = |error: PrintSimError| failed(error).at(input_name(&args.job));
-    let measured = args.measure(&simulated).map_err(at_job)?;
+    let measured = args.measure(&simulated, places.as_ref()).map_err(at_job)?;
     if let Some(body) = &args.body {
         let layers = simulated.body(format!("print-sim --print {number}")).map_err(at_job)?;
         write_layers(layers.into_iter().map(Ok), &body_output(body), &progress)?;
     }
-    let table = measured.table.to_csv();
+    let table = measured.table.to_text();
     match is_stream(&args.output) {
         true => print(&table)?,
         false => write_file(&args.output, |out| out.write_all(table.as_bytes()))?,
@@ -193,13 +217,20 @@ impl PrintSimArgs {
                 "standard output cannot take both the table and its JSON: name a file with -o",
             ));
         }
+        let name = self.output.to_string_lossy();
+        match self.places {
+            Some(_) => parse_toml(&name),
+            None => parse_table(&name),
+        }
+        .map_err(Exit::usage)?;
+        let inputs = || self.truth.iter().chain(&self.places);
         let outputs = std::iter::once(&self.output).chain(&self.body);
         for output in outputs.filter(|output| !is_stream(output)) {
             check_outside_job(&self.job, output)?;
-            check_not_input(output, &self.truth)?;
+            check_not_input(output, inputs())?;
         }
         let Some(body) = &self.body else {
-            return check_beside(&self.output, Path::new("-"), &self.truth);
+            return check_beside(&self.output, Path::new("-"), inputs());
         };
         let is_tiff = |end: &std::ffi::OsStr| {
             ["tif", "tiff"].iter().any(|tiff| end.eq_ignore_ascii_case(tiff))
@@ -207,19 +238,19 @@ impl PrintSimArgs {
         if !body.extension().is_some_and(is_tiff) {
             return Err(Exit::usage("name a TIFF file for the body, such as --body printed.tif"));
         }
-        check_beside(&self.output, body, &self.truth)
+        check_beside(&self.output, body, inputs())
     }
 
     /// Checks that the noise is of the kind that is measured.
     fn check_noise(&self) -> Result<(), Exit> {
-        match (self.noise, self.heights) {
-            (Some(Noise::Length(_)), None) => Err(Exit::usage(
+        match (self.noise, self.heights.is_some() || self.places.is_some()) {
+            (Some(Noise::Length(_)), false) => Err(Exit::usage(
                 "the --noise of counts of pixels is a share, such as 2%; a length is for \
-                     --heights",
+                     --heights and --places",
             )),
-            (Some(Noise::Share(_)), Some(_)) => Err(Exit::usage(
-                "the --noise of heights is a length, such as 2um; a share is for counts of \
-                     pixels",
+            (Some(Noise::Share(_)), true) => Err(Exit::usage(
+                "the --noise of heights and places is a length, such as 2um; a share is for counts \
+                     of pixels",
             )),
             _ => Ok(()),
         }
@@ -228,14 +259,29 @@ impl PrintSimArgs {
     /// Returns where the truth's material is: a name as it is, a file beside the truth's.
     fn beside_truth(&self, word: &str) -> PathBuf {
         let path = Path::new(word);
-        let folder = self.truth.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
         match is_file::<Material>(path) && own_file::<Material>(path).is_none() {
-            true => folder.join(path),
+            true => self.truth_folder().join(path),
             false => path.to_owned(),
         }
     }
 
-    fn measure(&self, print: &SimulatedPrint<'_>) -> Result<Measured, PrintSimError> {
+    fn truth_folder(&self) -> &Path {
+        self.truth.as_deref().and_then(Path::parent).unwrap_or(Path::new(""))
+    }
+
+    fn measure(
+        &self,
+        print: &SimulatedPrint<'_>,
+        places: Option<&Places>,
+    ) -> Result<Measured, PrintSimError> {
+        let length = match self.noise {
+            Some(Noise::Length(length)) => Some(length),
+            _ => None,
+        };
+        if let Some(places) = places {
+            let table = print.sizes(places, length, self.seed)?;
+            return Ok(Measured { table, uncured: None });
+        }
         let Some(places) = self.heights else {
             let noise = match self.noise {
                 Some(Noise::Share(share)) => share,
@@ -243,11 +289,7 @@ impl PrintSimArgs {
             };
             return Ok(Measured { table: print.areas(noise, self.seed), uncured: None });
         };
-        let sd = match self.noise {
-            Some(Noise::Length(length)) => length,
-            _ => HEIGHT_NOISE,
-        };
-        let heights = print.heights(places, sd, self.seed)?;
+        let heights = print.heights(places, length.unwrap_or(HEIGHT_NOISE), self.seed)?;
         Ok(Measured { table: heights.measured, uncured: Some(heights.uncured) })
     }
 }
@@ -264,6 +306,10 @@ fn facts(print: usize, measured: &Measured) -> Vec<String> {
         (PrintError::Micrometers(um), PrintMeasurements::Heights(rows)) => {
             let places = number_of(rows.len() as u64, "place");
             format!("heights at {places} are {} um off (RMS)", significant(um))
+        }
+        (PrintError::Micrometers(um), PrintMeasurements::Places { places, .. }) => {
+            let places = number_of(places.all().len() as u64, "place");
+            format!("{places} are {} um off (RMS)", significant(um))
         }
         (error, _) => format!("{} wrong pixels", grouped(error.number() as u64)),
     };
@@ -284,6 +330,9 @@ fn answer<'a>(
         (PrintError::Pixels(wrong), _) => (Some(wrong), None, None),
         (PrintError::Micrometers(um), PrintMeasurements::Heights(rows)) => {
             (None, Some(um), Some(rows.len()))
+        }
+        (PrintError::Micrometers(um), PrintMeasurements::Places { places, .. }) => {
+            (None, Some(um), Some(places.all().len()))
         }
         (PrintError::Micrometers(um), _) => (None, Some(um), None),
     };
