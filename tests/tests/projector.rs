@@ -167,7 +167,8 @@ fn a_picture_of_dots_gives_a_projector_its_light() {
     misused(&format!("{line} --flat-field mine.toml"), &["mine.toml", ".png"]);
     misused(&format!("{line} --flat-field camera.png"), &["camera.png"]);
     misused(&format!("{line} --flat-field light.tif"), &["light.tif", ".png"]);
-    refused(&line.replace("camera.png", "dots.tif"), &["dots.tif", "not a complete PNG"]);
+    refused(&line.replace("camera.png", "dots.tif"), &["dots.tif", "this picture is a TIFF"]);
+    refused(&line.replace("camera.png", "-"), &["a picture is read from a file"]);
     let other = line.replace("small.toml", "zhao");
     refused(&other, &["dots.tif", "96 x 64 pixels", "1024 x 768 mirrors"]);
     let many = line.replace("dots.tif", "plan/bitmaps.tif");

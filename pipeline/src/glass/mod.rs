@@ -11,7 +11,7 @@ mod kinetics_report;
 mod target;
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use lamp_grayscale::resin::ExposureTime;
@@ -23,7 +23,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::Error;
-use crate::documents::open_stack;
+use crate::documents::{is_stream, open_stack};
 use target::of_work;
 
 pub use camera::CameraSettings;
@@ -91,11 +91,21 @@ fn bitmaps_of(path: &Path, projector: &Projector) -> Result<Vec<ShownBitmap>, Er
     Ok(bitmaps)
 }
 
+/// The first bytes of TIFF and BigTIFF files in both byte orders.
+const TIFF_STARTS: [&[u8]; 4] = [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"];
+
 /// Reads a picture of gray levels.
 fn gray_picture(path: &Path) -> Result<GrayPicture, Error> {
+    if is_stream(path) {
+        return Err(Error::work("a picture is read from a file, not from a stream: name a PNG"));
+    }
     let read = || -> Result<GrayPicture, Error> {
-        let file = File::open(path)?;
-        GrayPicture::read(BufReader::new(file)).map_err(of_work)
+        let mut file = BufReader::new(File::open(path)?);
+        if TIFF_STARTS.iter().any(|start| file.fill_buf().is_ok_and(|it| it.starts_with(start))) {
+            let problem = "this picture is a TIFF: write it as a PNG of 16-bit gray levels";
+            return Err(Error::work(problem));
+        }
+        GrayPicture::read(file).map_err(of_work)
     };
     read().map_err(|error| error.at(path.display().to_string()))
 }
