@@ -8,7 +8,7 @@ use crate::speed::{LightField, TimedPart};
 /// Images of more pixels are rejected: their light would take gigabytes.
 const MOST_PIXELS: u64 = 1 << 26;
 
-/// What a picture shows.
+/// The light that a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldKind {
     /// The light of a wide white field: how much of its light each pixel has.
@@ -20,7 +20,7 @@ pub enum FieldKind {
 /// A machine's light over the field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueField {
-    /// What the picture shows.
+    /// The light that the picture shows.
     pub kind: FieldKind,
     /// The picture.
     pub picture: FieldPicture,
