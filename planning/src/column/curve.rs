@@ -5,6 +5,8 @@ use lamp_grayscale::resin::{CureModel, DepthRange, Dose, Quantity, TwoDepth};
 use lamp_stack::Length;
 use thiserror::Error;
 
+use crate::numeric::OF_95_PERCENT;
+
 /// The height over a glass that a dose cures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightCurve {
@@ -28,9 +30,6 @@ pub enum NoHeights {
     #[error(transparent)]
     Numbers(#[from] MaterialError),
 }
-
-/// Half of a 95% interval, in standard deviations.
-const OF_95_PERCENT: f64 = 1.96;
 
 /// Raises a number by its standard deviation. Returns whether it states one.
 fn raise<T: Quantity>(given: &mut Given<T>) -> bool {

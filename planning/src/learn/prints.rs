@@ -457,6 +457,18 @@ fn plants_that_drift_are_learned_as_well_as_known_light_allows() {
     }
 }
 
+/// One lattice left the truth out: a few of its states fitted the steps of the counts by chance. Print 2
+/// had 30,296 wrong pixels then, and 105,248 from another start.
+#[test]
+fn states_that_fit_by_chance_do_not_drive_out_the_truth() {
+    let (square, light) = (part(&square_prism(0)), pegda(100.0));
+    let start = vec![0.2854; LAYERS];
+    let course = course_of(&square, light, plant_of(11, 0.02), &start, 11);
+    assert!(worst_rise(&course.wrong) <= 1.2, "{course:?}");
+    assert!(50 * course.wrong[1] <= course.wrong[0], "{course:?}");
+    assert!(course.covered.as_flattened().iter().filter(|is| **is).count() >= 8, "{course:?}");
+}
+
 #[test]
 #[ignore = "it prints a table, and takes an hour"]
 fn hundreds_of_plants_are_learned_in_three_prints() {

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use super::heights::{height_of, height_with};
 use super::place::PlacePixels;
 use crate::light::{IntensityOf, Light};
-use crate::numeric::{dot, solve_positive};
+use crate::numeric::{OF_95_PERCENT, dot, solve_positive};
 use crate::speed::{DoseGrid, PartError, Simulation, TimedPart};
 
 /// The standard deviations of the numbers of a material that states no interval, as logarithms: how
@@ -57,7 +57,7 @@ pub struct Factor {
 impl Factor {
     /// Returns the ends of the 95 % interval.
     pub fn interval(self) -> [f64; 2] {
-        [-1.96, 1.96].map(|sds| self.value * (sds * self.sd).exp())
+        [-OF_95_PERCENT, OF_95_PERCENT].map(|sds| self.value * (sds * self.sd).exp())
     }
 }
 
@@ -150,8 +150,7 @@ pub(super) fn stated_sd<T: Quantity>(given: &Given<T>) -> Option<f64> {
 
 /// Returns the standard deviation of a number's logarithm, given half of its interval.
 pub(super) fn sd_of(half: f64, value: f64) -> f64 {
-    // An interval of 95 % reaches 1.96 standard deviations to each side.
-    (half / (1.96 * value)).max(BEST_STATED)
+    (half / (OF_95_PERCENT * value)).max(BEST_STATED)
 }
 
 /// Returns how exactly a material states its numbers, as standard deviations of logarithms.
@@ -246,6 +245,8 @@ fn logs_of(
 
 /// The spreads whose light is kept: enough for a state and the states around it.
 const KEPT: usize = 6;
+/// The most of them that are kept where their light takes little memory.
+const MOST_KEPT: usize = 48;
 
 impl<'a> Model<'a> {
     pub(crate) fn new(part: &'a TimedPart, light: &Light, memory: u64) -> Self {
@@ -260,9 +261,12 @@ impl<'a> Model<'a> {
         let mut known = match found {
             Some(at) => self.known.remove(at),
             None => {
-                self.known.truncate(KEPT - 1);
+                let bytes =
+                    self.known.first().map_or(0, |known| known.simulation.columns().bytes());
+                let fit = (self.memory / bytes.max(1)).min(MOST_KEPT as u64) as usize;
+                self.known.truncate(fit.max(KEPT) - 1);
                 let (memory, least) = (self.memory, self.sampled);
-                let simulation = Simulation::sampled_by(self.part, &light, memory, least)?;
+                let simulation = Simulation::rounded(self.part, &light, memory, least)?;
                 self.sampled = simulation.sampled();
                 Spreading { log_spread: logs[SPREAD], simulation, pixels: HashMap::new() }
             }
@@ -529,14 +533,16 @@ impl Fit<'_, '_> {
         let half_pixel = self.model.half_pixel(x);
         (0..NUMBERS).for_each(|k| covariance[k][k] += half_pixel * half_pixel / 3.0);
         let places: usize = self.prints.iter().map(|print| print.places.len()).sum();
-        let mut round = 1;
+        let (mut lattices, mut tried) = (Vec::new(), Vec::new());
         loop {
-            let half_width =
-                (WIDTH_SDS * covariance[DOSE][DOSE].sqrt()).clamp(LEAST_WIDTH, MOST[DOSE]);
-            let step = half_width / DOSES as f64;
-            let grid = DoseGrid { middle: mean[DOSE], step, half: DOSES };
             let lattice = Lattice::of(&mean, &covariance);
-            let tried = self.tried(&lattice, &grid)?;
+            let grid = grid_around(&mean, &covariance);
+            for pair in lattice.pairs() {
+                let squares = |print| self.model.squares_by_dose(pair, print, &grid);
+                let prints = self.prints.iter().map(squares).collect::<Result<_, PartError>>()?;
+                tried.push(Tried { pair, lattice: lattices.len(), grid, prints });
+            }
+            lattices.push(lattice);
             let least = |of: fn(&SquaresByDose) -> &[f64]| {
                 let of_tried = |tried: &Tried| {
                     let of_print = |print| of(print).iter().copied().fold(f64::INFINITY, f64::min);
@@ -545,49 +551,64 @@ impl Fit<'_, '_> {
                 tried.iter().map(of_tried).fold(f64::INFINITY, f64::min) / places as f64
             };
             // Measurements that no state explains are less exact than they should be (Birge 1932).
-            let birge = least(|print| &print.sharp).max(1.0);
+            let birge = self.variance_shown(least(|print| &print.sharp), places);
+            let doses: Vec<_> = tried.iter().map(|tried| self.doses_of(tried, birge)).collect();
+            // A state stands for the area around it, where lattices overlap for less of it (the mixture
+            // of Owen and Zhou 2000).
+            let logs = tried.iter().zip(&doses).map(|(tried, (log_sum, _))| {
+                let of_lattice = |(number, lattice): (usize, &Lattice)| {
+                    if number == tried.lattice || lattice.holds(tried.pair) {
+                        lattice.density()
+                    } else {
+                        0.0
+                    }
+                };
+                let density: f64 = lattices.iter().enumerate().map(of_lattice).sum();
+                [log_sum - 0.5 * self.pair_prior_squares(tried.pair), density.ln()]
+            });
+            let (weights, share) = weights_of(&logs.collect::<Vec<_>>());
             let members: Vec<_> = tried
                 .iter()
-                .map(|tried| {
-                    let (log_sum, doses) = self.doses_of(tried, birge, &grid);
-                    (log_sum - 0.5 * self.pair_prior_squares(tried.pair), doses)
+                .zip(&weights)
+                .zip(doses)
+                .map(|((tried, &weight), (_, doses))| {
+                    (Member { pair: tried.pair, weight, doses }, tried.grid)
                 })
                 .collect();
-            let (weights, share) =
-                weights_of(&members.iter().map(|member| member.0).collect::<Vec<_>>());
-            let members: Vec<_> = tried
-                .iter()
-                .zip(weights)
-                .zip(members)
-                .map(|((tried, weight), (_, doses))| Member { pair: tried.pair, weight, doses })
-                .collect();
-            (mean, covariance) = moments_of(&members, &grid);
-            lattice.add_cells(&mut covariance);
-            let count = 1.0 / members.iter().map(|member| member.weight.powi(2)).sum::<f64>();
-            if share == 1.0 && count >= ENOUGH || round == MOST_ROUNDS {
+            (mean, covariance) = moments_of(&members);
+            lattices[lattices.len() - 1].add_cells(&mut covariance);
+            let count = dot(&weights, &weights).recip();
+            if share == 1.0 && count >= ENOUGH || lattices.len() == MOST_ROUNDS {
                 let misfit = least(|print| &print.loose).sqrt();
+                let grid = grid_around(&mean, &covariance);
+                let members = resampled(members).into_iter().map(|(member, own)| {
+                    let doses = regridded(&member.doses, &own, &grid);
+                    Member { doses, ..member }
+                });
+                let members = members.collect();
                 let mean = LightState::new(&mean, covariance);
                 return Ok(ProbableStates { mean, misfit, grid, members });
             }
-            round += 1;
         }
     }
 
-    /// Returns the sums of squares at all doses of the states of a lattice.
-    fn tried(&mut self, lattice: &Lattice, grid: &DoseGrid) -> Result<Vec<Tried>, PartError> {
-        let mut all = Vec::new();
-        for pair in lattice.pairs() {
-            let squares = |print| self.model.squares_by_dose(pair, print, grid);
-            let prints = self.prints.iter().map(squares).collect::<Result<_, PartError>>()?;
-            all.push(Tried { pair, prints });
+    /// Returns the variance of measurements as a multiple of the assumed one, given the mean square of
+    /// the best state's distances. A count states no variance, and may be more exact than assumed: the
+    /// variance is the mean of an inverse gamma distribution whose prior is worth some measurements
+    /// (Gelman et al. 2013, section 2.6).
+    fn variance_shown(&self, mean_square: f64, places: usize) -> f64 {
+        let is_counted = |place: &Measurement| matches!(place, Measurement::Counts { .. });
+        if mean_square >= 1.0 || !self.prints.iter().all(|p| p.places.iter().all(is_counted)) {
+            return mean_square.max(1.0);
         }
-        Ok(all)
+        (PRIOR_PLACES + places as f64 * mean_square) / (PRIOR_PLACES + places as f64)
     }
 
     /// Returns the logarithm of how probable a depth and a spread make the measurements, and the
     /// probabilities of the doses of the last print (a filter of a random walk: Särkkä 2013, section
     /// 4.1).
-    fn doses_of(&self, tried: &Tried, birge: f64, grid: &DoseGrid) -> (f64, Vec<f64>) {
+    fn doses_of(&self, tried: &Tried, birge: f64) -> (f64, Vec<f64>) {
+        let grid = &tried.grid;
         let prior = |number| 0.5 * (grid.log(number) / self.prior_sds[DOSE]).powi(2);
         let mut logs: Vec<_> = (0..grid.count()).map(|number| -prior(number)).collect();
         let (mut log_sum, mut doses) = (0.0, Vec::new());
@@ -605,7 +626,8 @@ impl Fit<'_, '_> {
             doses.iter_mut().for_each(|dose| *dose /= sum);
             log_sum += most + sum.ln();
         }
-        (log_sum, doses)
+        // Sums over doses are integrals once multiplied by the grid's step.
+        (log_sum + grid.step.ln(), doses)
     }
 
     /// Returns the sum of squares of a depth and a spread themselves.
@@ -721,12 +743,56 @@ fn drift_steps(step: f64) -> usize {
 /// A depth and a spread that were tried, with the sums of squares of each print.
 struct Tried {
     pair: [f64; 2],
+    /// The number of its lattice.
+    lattice: usize,
+    grid: DoseGrid,
     prints: Vec<SquaresByDose>,
 }
 
+/// Returns the doses to try around a mean.
+fn grid_around(mean: &[f64; NUMBERS], covariance: &[[f64; NUMBERS]; NUMBERS]) -> DoseGrid {
+    let half_width = (WIDTH_SDS * covariance[DOSE][DOSE].sqrt()).clamp(LEAST_WIDTH, MOST[DOSE]);
+    DoseGrid { middle: mean[DOSE], step: half_width / DOSES as f64, half: DOSES }
+}
+
+/// Returns the probabilities of doses of a grid at the doses of another one: each is shared by its two
+/// neighbors. Doses beyond the other grid are left out.
+fn regridded(doses: &[f64], from: &DoseGrid, to: &DoseGrid) -> Vec<f64> {
+    let mut all = vec![0.0; to.count()];
+    for (number, dose) in doses.iter().enumerate() {
+        let place = (from.log(number) - to.log(0)) / to.step;
+        let below = place.floor();
+        for (at, share) in [(below, below + 1.0 - place), (below + 1.0, place - below)] {
+            if at >= 0.0 && at < to.count() as f64 {
+                all[at as usize] += share * dose;
+            }
+        }
+    }
+    all
+}
+
+/// Returns a few members, of equal weights, which stand for all (systematic resampling: Kitagawa 1996).
+/// Spreads are in order: light of columns is computed for each.
+fn resampled(mut members: Vec<(Member, DoseGrid)>) -> Vec<(Member, DoseGrid)> {
+    members.sort_by(|(a, _), (b, _)| a.pair[1].total_cmp(&b.pair[1]));
+    let (mut sum, mut taken) = (0.0, 0_u32);
+    let mut few = Vec::new();
+    for (member, grid) in members {
+        sum += f64::from(FEW) * member.weight;
+        // Places are at the middles of equal parts of the weight.
+        let upto = ((sum + 0.5) as u32).min(FEW);
+        if upto > taken {
+            let weight = f64::from(upto - taken) / f64::from(FEW);
+            few.push((Member { weight, ..member }, grid));
+            taken = upto;
+        }
+    }
+    few
+}
+
 /// Returns the mean and the covariance of states.
-fn moments_of(members: &[Member], grid: &DoseGrid) -> ([f64; NUMBERS], [[f64; NUMBERS]; NUMBERS]) {
-    let own = |member: &Member| {
+fn moments_of(members: &[(Member, DoseGrid)]) -> ([f64; NUMBERS], [[f64; NUMBERS]; NUMBERS]) {
+    let own = |(member, grid): &(Member, DoseGrid)| {
         let logs = || member.doses.iter().enumerate().map(|(at, dose)| (grid.log(at), dose));
         let mean = logs().map(|(log, dose)| log * dose).sum::<f64>();
         let variance = logs().map(|(log, dose)| (log - mean).powi(2) * dose).sum::<f64>();
@@ -738,11 +804,13 @@ fn moments_of(members: &[Member], grid: &DoseGrid) -> ([f64; NUMBERS], [[f64; NU
     let all: Vec<_> = members.iter().map(own).collect();
     let mean: [f64; NUMBERS] =
         std::array::from_fn(|k| all.iter().map(|(weight, logs, _)| weight * logs[k]).sum());
+    // Distances from a mean of few states are too small.
+    let few = 1.0 / (1.0 - all.iter().map(|(weight, ..)| weight * weight).sum::<f64>()).max(0.5);
     let covariance = std::array::from_fn(|a| {
         std::array::from_fn(|b| {
             let within = |variance: f64| if (a, b) == (DOSE, DOSE) { variance } else { 0.0 };
             let of = |(weight, logs, variance): &(f64, [f64; NUMBERS], f64)| {
-                weight * ((logs[a] - mean[a]) * (logs[b] - mean[b]) + within(*variance))
+                weight * (few * (logs[a] - mean[a]) * (logs[b] - mean[b]) + within(*variance))
             };
             all.iter().map(of).sum()
         })
@@ -750,14 +818,17 @@ fn moments_of(members: &[Member], grid: &DoseGrid) -> ([f64; NUMBERS], [[f64; NU
     (mean, covariance)
 }
 
-/// Returns the weights of states, whose sum is 1, and the share of their logarithms that is taken.
+/// Returns the weights of states, whose sum is 1, and the share of their logarithms that is taken. The
+/// states have the logarithm of their probability, and of the density of states at their place.
 ///
 /// Few states are left of measurements that are more exact than the states are close. Weights are
 /// evened out then, until enough states are left.
-fn weights_of(logs: &[f64]) -> (Vec<f64>, f64) {
-    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+fn weights_of(logs: &[[f64; 2]]) -> (Vec<f64>, f64) {
+    let most = logs.iter().map(|log| log[0]).fold(f64::NEG_INFINITY, f64::max);
+    let densest = logs.iter().map(|log| log[1]).fold(f64::NEG_INFINITY, f64::max);
     let at = |share: f64| {
-        let weights: Vec<_> = logs.iter().map(|log| (share * (log - most)).exp()).collect();
+        let weight = |log: &[f64; 2]| (share * (log[0] - most) - (log[1] - densest)).exp();
+        let weights: Vec<_> = logs.iter().map(weight).collect();
         let sum: f64 = weights.iter().sum();
         weights.into_iter().map(|weight| weight / sum).collect::<Vec<_>>()
     };
@@ -787,8 +858,8 @@ struct Lattice {
 /// The steps of a lattice to each side of its mean, and their length in standard deviations.
 const SPREAD_STEPS: i32 = 2;
 const SPREAD_STEP_SDS: f64 = 1.2;
-const DEPTH_STEPS: i32 = 3;
-const DEPTH_STEP_SDS: f64 = 0.8;
+const DEPTH_STEPS: i32 = 4;
+const DEPTH_STEP_SDS: f64 = 0.65;
 /// The least variance of a direction in which states are tried.
 const LEAST_VARIANCE: f64 = 1e-8;
 
@@ -804,6 +875,19 @@ impl Lattice {
             along_step: SPREAD_STEP_SDS * along,
             depth_step: DEPTH_STEP_SDS * across.sqrt(),
         }
+    }
+
+    /// Returns the number of its states in a unit of area.
+    fn density(&self) -> f64 {
+        1.0 / (self.spread_step * self.depth_step)
+    }
+
+    /// Returns whether a depth and a spread are within half a step of its states.
+    fn holds(&self, [depth, spread]: [f64; 2]) -> bool {
+        let of_spread = (spread - self.mean[1]) / self.spread_step;
+        let of_depth = (depth - self.mean[0] - self.along_step * of_spread) / self.depth_step;
+        let is_within = |at: f64, steps: i32| at.abs() <= f64::from(steps) + 0.5;
+        is_within(of_spread, SPREAD_STEPS) && is_within(of_depth, DEPTH_STEPS)
     }
 
     /// Returns the depths and spreads.
@@ -837,12 +921,16 @@ const DOSES: usize = 150;
 const WIDTH_SDS: f64 = 6.0;
 /// The least distance, as a logarithm: earlier prints had other doses.
 const LEAST_WIDTH: f64 = 0.1;
+/// The measurements that the assumed variance of counts is worth.
+const PRIOR_PLACES: f64 = 10.0;
 /// The most lattices, each around the states of the last one.
 const MOST_ROUNDS: usize = 8;
-/// Weights are evened out until this many states of a lattice count. If as many count as `ENOUGH`
-/// without that, the lattice is close enough: of states as far apart as its covariance says, 13 do.
-const LEAST_COUNT: f64 = 4.0;
-const ENOUGH: f64 = 7.0;
+/// The members by which the next print is expected.
+const FEW: u32 = 40;
+/// Weights are evened out until this many states count. If as many count as `ENOUGH`
+/// without that, they are close enough: of states as far apart as its covariance says, 16 do.
+const LEAST_COUNT: f64 = 8.0;
+const ENOUGH: f64 = 16.0;
 
 /// States that the measurements allow.
 pub(crate) struct ProbableStates {

@@ -14,6 +14,10 @@ pub(crate) use cholesky::solve_positive;
 pub(crate) use lbfgs::{DescentEnd, descend};
 pub(crate) use random::Random;
 
+/// Half of the 95 % interval of a normal distribution, in standard deviations (NIST/SEMATECH e-Handbook
+/// of Statistical Methods, section 1.3.6.7.1).
+pub(crate) const OF_95_PERCENT: f64 = 1.96;
+
 /// Returns the sum of products, from the first to the last.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()

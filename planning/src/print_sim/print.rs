@@ -549,7 +549,8 @@ mod tests {
         // Of intervals that hold 95 %, fewer than 3 of 4 hold once in 70 tries.
         assert!(held.iter().all(|held| *held >= 3), "{held:?} {widths:?}");
         assert!(widths[0] < 0.05 && widths[1] < 0.1, "{widths:?}");
-        // Together with counts, the state is known better than by either.
+        // Sizes make the state that counts show surer. Three sizes that fit by chance look surer
+        // alone, as the noise of all measurements is found in common.
         let measured = print.sizes(&places, Some(Length::from_um(5.0)), 1).unwrap();
         let counts = print.areas(0.02, 1);
         let text = PrintMeasurements::joined([&counts.to_text(), &measured.to_text()]).unwrap();
@@ -557,7 +558,7 @@ mod tests {
         assert_eq!(PrintMeasurements::parse(&joint.to_text()).unwrap(), joint);
         assert_eq!(joint.error(), counts.error());
         let sds = [&measured, &counts, &joint].map(|all| learned(all)[0].sd);
-        assert!(sds[2] < sds[0] && sds[2] < 1.05 * sds[1], "{sds:?}");
+        assert!(sds[2] < sds[1] && sds[2] < 1.5 * sds[0], "{sds:?}");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! along a straight wall. Equal columns are stored once, with their count.
 
 use std::collections::HashMap;
-use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Columns that are worked on at once: their doses through all layers stay in the cache.
 pub(crate) const LANES: usize = 256;
@@ -31,6 +31,11 @@ impl PixelColumns {
         &self.blocks
     }
 
+    /// Returns the bytes that the light takes.
+    pub(crate) fn bytes(&self) -> u64 {
+        (self.blocks.len() * LANES * self.layers * size_of::<f32>()) as u64
+    }
+
     pub(crate) fn layers(&self) -> usize {
         self.layers
     }
@@ -44,8 +49,33 @@ pub(crate) struct ColumnSet {
     light: Vec<f32>,
     weights: Vec<f64>,
     /// Columns by their hash; columns with the same hash form a chain.
-    by_hash: HashMap<u64, usize, BuildHasherDefault<DefaultHasher>>,
+    by_hash: HashMap<u64, usize, BuildHasherDefault<KeptHash>>,
     next: Vec<usize>,
+}
+
+/// A number that is a hash already.
+#[derive(Debug, Default)]
+struct KeptHash(u64);
+
+impl Hasher for KeptHash {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.0 = mixed(self.0, u64::from(*byte)));
+    }
+
+    fn write_u64(&mut self, number: u64) {
+        self.0 = number;
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
+
+/// Mixes a number into a hash. Every pixel of a part is hashed, in every layer: a hash that withstands
+/// chosen collisions would take a third of the time of learning.
+fn mixed(hash: u64, number: u64) -> u64 {
+    let product = (hash ^ number).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    product ^ (product >> 32)
 }
 
 /// The end of a chain.
@@ -70,8 +100,7 @@ impl ColumnSet {
     pub(crate) fn add(&mut self, column: &[f32], weight: f64) {
         // Compares bits, not values: a negative zero is a wanted voxel, a positive one is not.
         let same = |a: &[f32]| a.iter().zip(column).all(|(a, b)| a.to_bits() == b.to_bits());
-        let bits: Vec<u32> = column.iter().map(|light| light.to_bits()).collect();
-        let hash = self.by_hash.hasher().hash_one(&bits);
+        let hash = column.iter().fold(0, |hash, light| mixed(hash, u64::from(light.to_bits())));
         let first = self.by_hash.get(&hash).copied().unwrap_or(NONE);
         let mut at = first;
         while at != NONE {

@@ -23,6 +23,8 @@ pub(crate) struct Gather<'a> {
     /// The machine's own light, if it differs from the images.
     field: Option<LightField>,
     side: usize,
+    /// The bits of a light that are kept.
+    kept: LightBits,
     /// The rows and columns where any layer is not black, and around them as far as light spreads.
     tiles: Vec<[i64; 2]>,
 }
@@ -33,6 +35,27 @@ pub(crate) enum LightField {
     Shares(Vec<f32>),
     /// The light of all layers, after it spread, where a wide white field has 1.
     Picture(Vec<f32>),
+}
+
+/// The leading bits of the light of columns that are kept. The fewer there are, the more columns are
+/// equal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LightBits {
+    /// All of them.
+    All,
+    /// Twelve after the first, which leave an eighth of a thousandth: states are known less well.
+    Twelve,
+}
+
+impl LightBits {
+    /// Returns a light with its leading bits, rounded. The sign stays.
+    #[inline(always)]
+    fn of(self, light: f32) -> f32 {
+        match self {
+            Self::All => light,
+            Self::Twelve => f32::from_bits((light.to_bits() + (1 << 10)) & !((1 << 11) - 1)),
+        }
+    }
 }
 
 /// The weights of the pixels around one, from the first that matters to the last.
@@ -74,12 +97,17 @@ struct TileRoom {
 }
 
 impl<'a> Gather<'a> {
-    pub(crate) fn new(part: &'a TimedPart, light: &Light) -> Self {
-        Self::in_field(part, light, None)
+    pub(crate) fn new(part: &'a TimedPart, light: &Light, kept: LightBits) -> Self {
+        Self::in_field(part, light, kept, None)
     }
 
     /// As [`new`](Self::new), in a machine's light.
-    pub(crate) fn in_field(part: &'a TimedPart, light: &Light, field: Option<LightField>) -> Self {
+    pub(crate) fn in_field(
+        part: &'a TimedPart,
+        light: &Light,
+        kept: LightBits,
+        field: Option<LightField>,
+    ) -> Self {
         let blur = Blur::<f32>::of_scan(part.spread_pixels(light));
         let sum = blur.sum();
         let light_of = (0..=255).map(|level| (light.of_level(level) / sum) as f32).collect();
@@ -89,7 +117,7 @@ impl<'a> Gather<'a> {
         let fits = |&side: &usize| side <= 4 * blur.radius() && bytes(side) <= MOST_TILE_BYTES;
         let side = SIDES.into_iter().rev().find(fits).unwrap_or(SIDES[0]);
         let taps = WindowTaps::of(&blur);
-        let mut gather = Self { part, blur, light_of, taps, field, side, tiles: Vec::new() };
+        let mut gather = Self { part, blur, light_of, taps, field, side, kept, tiles: Vec::new() };
         gather.tiles = gather.lit_tiles();
         gather
     }
@@ -191,7 +219,7 @@ impl<'a> Gather<'a> {
         for places in places.chunks(4 * most) {
             let light = self.light_of_pixels(places);
             for number in 0..places.len() {
-                let of_layers = light.iter().map(|lights| lights[number]);
+                let of_layers = light.iter().map(|lights| self.kept.of(lights[number]));
                 column.iter_mut().zip(of_layers).for_each(|(to, light)| *to = light);
                 all.add_lit(&column, weight);
             }
@@ -393,7 +421,8 @@ impl<'a> Gather<'a> {
                 });
                 // Zeros carry the sign too, so that voxels without light keep their role.
                 let signed = |(level, light): (&u8, &f32)| {
-                    if *level >= self.part.wanted() { -light } else { *light }
+                    let light = self.kept.of(*light);
+                    if *level >= self.part.wanted() { -light } else { light }
                 };
                 planes.push(rows.map(signed).collect());
             }
@@ -557,7 +586,7 @@ mod tests {
                 pages.push(Layer { pitch: Some(pitch), ..layer }).unwrap();
             });
             let part = pages.finish().unwrap();
-            let gather = Gather::new(&part, &pegda(200.0));
+            let gather = Gather::new(&part, &pegda(200.0), LightBits::All);
             for pixel in [[0, 0], [5, 7], [20, 14], [44, 24], [49, 29]] {
                 let lights = gather.light_at(pixel);
                 for layer in [0, 20, 59] {
@@ -580,7 +609,7 @@ mod tests {
         }
         part.images[2] = Image::Gray(gray);
         for sigma_um in [0.0, 30.0, 200.0] {
-            let gather = Gather::new(&part, &pegda(sigma_um));
+            let gather = Gather::new(&part, &pegda(sigma_um), LightBits::All);
             let [width, height] = part.size().map(i64::from);
             let pixels: Vec<_> = (-9..height + 9)
                 .step_by(7)
@@ -609,7 +638,7 @@ mod tests {
     #[test]
     fn a_sample_stands_for_all_pixels() {
         let part = part(&cavity_staircase(4));
-        let gather = Gather::new(&part, &pegda(50.0));
+        let gather = Gather::new(&part, &pegda(50.0), LightBits::All);
         let (all, one) = gather.columns(usize::MAX, 1);
         let (some, many) = gather.columns(240 * 4 * 600, 1);
         assert!(one == 1 && many > 1);

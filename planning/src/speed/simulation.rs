@@ -4,7 +4,7 @@ use lamp_stack::Mask;
 
 use super::columns::{ColumnSet, PixelColumns};
 use super::dose_curve::{DoseCurves, DoseGrid};
-use super::gather::{Gather, LightField};
+use super::gather::{Gather, LightBits, LightField};
 use super::part::{PartError, TimedPart};
 use super::tally::{GradualWrong, Tally, gradual_wrong};
 use crate::blur::Blur;
@@ -32,19 +32,29 @@ impl<'a> Simulation<'a> {
     /// # Errors
     /// Returns an error if the model's numbers are impossible.
     pub fn new(part: &'a TimedPart, light: &Light, memory: u64) -> Result<Self, PartError> {
-        Self::sampled_by(part, light, memory, 1)
+        Self::prepared(part, light, memory, 1, LightBits::All)
     }
 
-    /// Prepares a part as [`new`](Self::new) does. Each column stands for `least` pixels or more: the
-    /// same part needed so many under a similar light.
-    pub(crate) fn sampled_by(
+    /// Prepares a part to learn from it: light is rounded, so that more columns are equal. Each column
+    /// stands for `least` pixels or more: the same part needed so many under a similar light.
+    pub(crate) fn rounded(
         part: &'a TimedPart,
         light: &Light,
         memory: u64,
         least: u32,
     ) -> Result<Self, PartError> {
+        Self::prepared(part, light, memory, least, LightBits::Twelve)
+    }
+
+    fn prepared(
+        part: &'a TimedPart,
+        light: &Light,
+        memory: u64,
+        least: u32,
+        kept: LightBits,
+    ) -> Result<Self, PartError> {
         let layers = reaches(part, light)?;
-        let gather = Gather::new(part, light);
+        let gather = Gather::new(part, light, kept);
         let bytes = (memory / COLUMNS_SHARE).min(MOST_COLUMN_BYTES);
         let (columns, sampled) = gather.columns(bytes as usize, least.isqrt());
         Ok(Self { gather, layers, columns, sampled })
@@ -58,7 +68,7 @@ impl<'a> Simulation<'a> {
         memory: u64,
     ) -> Result<Self, PartError> {
         let layers = reaches(part, light)?;
-        let gather = Gather::in_field(part, light, Some(field));
+        let gather = Gather::in_field(part, light, LightBits::All, Some(field));
         let bytes = (memory / COLUMNS_SHARE).min(MOST_COLUMN_BYTES);
         let (columns, sampled) = match gather.all_in(bytes as usize) {
             Some(all) => (all, 1),
