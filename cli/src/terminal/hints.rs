@@ -224,6 +224,7 @@ fn tile(error: &TileError) -> Option<String> {
         TileError::ManyBreaks => "give a wider --break-pitch, or --break-width 0um",
         TileError::NoOutline { .. } => "give --fit",
         TileError::LargePiece { .. } => "give a smaller --least-piece, or --mesh none",
+        TileError::WideEdgeGap { .. } => "give a smaller --edge-gap or a larger --area",
         TileError::WideMoat { .. } => "give a smaller --clearance, or --mesh none",
         TileError::TooManyRuns { .. } => "place fewer copies",
         TileError::Resolutions { .. } => "slice the parts at one resolution",

@@ -78,6 +78,14 @@ pub enum TileError {
         /// The part.
         name: String,
     },
+    /// The gap to the area's edges leaves no pixel of it.
+    #[error("an edge gap of {edge_gap} leaves nothing of the build area of {area_mm}")]
+    WideEdgeGap {
+        /// The least distance from copies to the area's edges.
+        edge_gap: Length,
+        /// The area as lengths.
+        area_mm: Size,
+    },
     /// The moat leaves no room for the mesh.
     #[error("a clearance of {clearance} is wider than the build area of {area_mm}")]
     WideMoat {

@@ -69,6 +69,43 @@ pub(super) fn fill(
     placements
 }
 
+/// Adds copies of several parts to the placed ones, up to what is wanted of each, and centers all
+/// of them. The part that has the smallest share of what is wanted comes first.
+pub(super) fn fill_evenly(
+    layout: &Layout,
+    regions: &mut NoFitRegions,
+    mut placements: Vec<CopyPlacement>,
+    wanted: &[u32],
+    ways: &[Vec<Way>],
+) -> Vec<CopyPlacement> {
+    // To the top and the left, so that the room is in one place.
+    let left = placements.iter().map(|at| at.left).min().unwrap_or(0);
+    let top = placements.iter().map(|at| at.top).min().unwrap_or(0);
+    placements.iter_mut().for_each(|at| (at.left, at.top) = (at.left - left, at.top - top));
+    let is_of = |part: usize, at: &CopyPlacement| ways[part].iter().any(|way| way.0 == at.part);
+    let count = |part| placements.iter().filter(|at| is_of(part, at)).count() as u64;
+    let mut counts: Vec<u64> = (0..wanted.len()).map(count).collect();
+    let mut open: Vec<usize> = (0..wanted.len()).collect();
+    let mut free = FreeRoom { layout, regions, taken: HashMap::new(), placements };
+    loop {
+        open.retain(|&part| counts[part] < u64::from(wanted[part]));
+        let fewer = |&one: &usize, &other: &usize| {
+            (counts[one] * u64::from(wanted[other])).cmp(&(counts[other] * u64::from(wanted[one])))
+        };
+        let Some(part) = open.iter().copied().min_by(fewer) else { break };
+        if free.place(&ways[part], PlacingRule::Top) {
+            counts[part] += 1;
+        } else {
+            // Places only fill up.
+            open.retain(|&other| other != part);
+        }
+    }
+    let mut placements = free.placements;
+    centre(layout, &mut placements);
+    placements.sort_by_key(|at| (at.part, at.top, at.left));
+    placements
+}
+
 /// The room left on an area.
 struct FreeRoom<'a> {
     layout: &'a Layout,
@@ -120,7 +157,12 @@ impl FreeRoom<'_> {
         let taken = self.taken.entry(key).or_insert_with(|| TakenPlaces::new(room));
         for at in &self.placements[taken.known..] {
             let no_fit = self.regions.no_fit(self.layout, key, (at.part, at.turn));
-            taken.add(&no_fit, (at.left / cell) as i32, (at.top / cell) as i32);
+            // A copy that begins within a cell takes what it would from either side of it.
+            let ends = |pixels: u32| [pixels / cell, pixels.div_ceil(cell)].map(|at| at as i32);
+            let ([left, right], [top, bottom]) = (ends(at.left), ends(at.top));
+            for row in top..=bottom {
+                (left..=right).for_each(|column| taken.add(&no_fit, column, row));
+            }
         }
         taken.known = self.placements.len();
         taken.first_free()

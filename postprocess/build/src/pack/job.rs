@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use lamp_stack::{MAX_SIDE, Orientation};
 
-use super::super::{CopyPlacement, Layout, TileError};
+use super::super::{CopyPlacement, Layout, PixelSize, TileError};
 use super::greedy::{self, PlacingRule};
 use super::no_fit::NoFitRegions;
 use super::{MAX_COPIES, Pack, PackBy, Turns, Way, grid, lattice, mix, shares};
@@ -22,6 +22,8 @@ pub(super) struct PackingJob<'a> {
     outlines: NoFitRegions,
     /// The regions of lattices, by the pixels on a side of their cells.
     of_lattices: HashMap<u32, NoFitRegions>,
+    /// How deep parts overlap, once a search has needed it.
+    depths: Option<mix::Ways>,
 }
 
 /// A way to find places.
@@ -40,7 +42,8 @@ impl<'a> PackingJob<'a> {
     pub(super) fn new(layout: &'a Layout, gap: u32, how: Pack) -> Self {
         let [boxes, outlines] =
             [PackBy::Boxes, PackBy::Outlines].map(|by| NoFitRegions::new(layout, gap, by));
-        Self { layout, gap, how, stacks: None, boxes, outlines, of_lattices: HashMap::new() }
+        let of_lattices = HashMap::new();
+        Self { layout, gap, how, stacks: None, boxes, outlines, of_lattices, depths: None }
     }
 
     /// Creates one whose parts have several stacks each.
@@ -86,23 +89,51 @@ impl<'a> PackingJob<'a> {
         }
     }
 
-    /// Finds places for copies of several parts. Where the first ones leave no room for a copy of
-    /// another part, each gets its share.
+    /// Finds places for copies of several parts. Where not all fit, each part gets its share, and
+    /// more where there is room.
     fn searched_for_each(
         &mut self,
         wanted: &[u32],
         simple: Vec<CopyPlacement>,
     ) -> Vec<CopyPlacement> {
-        let found = self.searched(wanted, simple, 0);
-        let has_copy = |part| {
-            let stacks = self.stacks_of(part);
-            found.iter().any(|at| stacks.contains(&at.part))
-        };
-        if (0..wanted.len()).all(has_copy) || wanted.contains(&0) {
-            return found;
+        let all = sum(wanted);
+        let is_whole = simple.len() == all;
+        if is_whole || self.may_fit(wanted) {
+            let mut work = mix::MOST_WORK;
+            let found = self.searched(wanted, simple, 0, &mut work);
+            if found.len() == all {
+                return found;
+            }
         }
         // So many copies by shares have no more of any part than is wanted.
-        shares::most(self, wanted, sum(wanted).min(MAX_COPIES as usize) as u32)
+        let shared = shares::most(self, wanted, all.min(MAX_COPIES as usize) as u32);
+        let ways = self.all_ways(wanted.len(), self.how.turns);
+        let regions = match self.how.by {
+            PackBy::Boxes => &mut self.boxes,
+            PackBy::Outlines => &mut self.outlines,
+        };
+        greedy::fill_evenly(self.layout, regions, shared, wanted, &ways)
+    }
+
+    /// Whether the area has as many pixels as all copies.
+    fn may_fit(&mut self, wanted: &[u32]) -> bool {
+        let PixelSize { width, height } = self.layout.pixels();
+        let white = wanted.iter().enumerate().map(|(part, &count)| {
+            let stacks = self.stacks_of(part).into_iter();
+            let white = stacks.map(|stack| {
+                let PixelSize { width, height } =
+                    self.layout.parts()[stack].size(Orientation::default());
+                match self.how.by {
+                    PackBy::Boxes => u128::from(width) * u128::from(height),
+                    PackBy::Outlines => {
+                        let outline = self.layout.parts()[stack].silhouette(Orientation::default());
+                        outline.white_pixels().into()
+                    }
+                }
+            });
+            white.min().unwrap_or(0) * u128::from(count)
+        });
+        white.sum::<u128>() <= u128::from(width) * u128::from(height)
     }
 
     fn check_fits(&self, part: usize) -> Result<(), TileError> {
@@ -181,19 +212,29 @@ impl<'a> PackingJob<'a> {
     }
 
     /// Returns the copies of several parts on fewer rows, or all of them where some were left out,
-    /// if that is found. The search ends at `enough` rows.
+    /// if that is found. The search ends at `enough` rows, or where no work is left.
     pub(super) fn searched(
         &mut self,
         wanted: &[u32],
         best: Vec<CopyPlacement>,
         enough: u32,
+        left_work: &mut u64,
     ) -> Vec<CopyPlacement> {
         let all = sum(wanted);
         if self.how.by != PackBy::Outlines || all > mix::MOST_COPIES {
             return best;
         }
         let (layout, gap) = (self.layout, self.gap);
-        let ways = self.all_ways(wanted.len(), self.how.turns);
+        let area = layout.pixels();
+        let fits = |&(stack, turn): &Way| {
+            let size = layout.parts()[stack].size(turn);
+            size.width <= area.width && size.height <= area.height
+        };
+        let mut ways = self.all_ways(wanted.len(), self.how.turns);
+        ways.iter_mut().for_each(|ways| ways.retain(fits));
+        if ways.iter().map(Vec::len).sum::<usize>() > mix::MOST_WAYS {
+            return best;
+        }
         // Where some were left out, they are placed below the area first.
         let mut tall = layout.clone();
         let longest = |part: usize| {
@@ -212,7 +253,8 @@ impl<'a> PackingJob<'a> {
             }
         }
         let Some(start) = start else { return best };
-        let mut found = mix::shorten(&tall, gap, &ways, start, enough);
+        let depths = self.depths.get_or_insert_with(|| mix::Ways::new(layout, gap, &ways));
+        let mut found = mix::shorten(&tall, gap, depths, start, enough, left_work);
         if mix::height(layout, &found) > layout.pixels().height {
             return best;
         }

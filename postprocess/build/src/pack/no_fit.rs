@@ -9,9 +9,10 @@ use std::rc::Rc;
 
 use lamp_stack::{Frame, Mask, Orientation, white_runs};
 
+use super::super::overlap::grown_by_gap;
 use super::super::{Layout, PixelSize};
 use super::{PackBy, Way};
-use lamp_offset::{join_runs, offset_one_bit};
+use lamp_offset::join_runs;
 
 /// The columns from the first up to but excluding the second.
 pub(super) type CellRun = (i32, i32);
@@ -131,8 +132,7 @@ impl NoFitRegions {
 impl CellOutline {
     fn new(outline: &Mask, gap: u32, cell: u32) -> Self {
         let size = PixelSize { width: outline.width(), height: outline.height() };
-        // Growing rounds to whole pixels, perhaps up.
-        let margin = if gap == 0 { 0 } else { (gap + 1).div_ceil(cell) };
+        let margin = gap.div_ceil(cell);
         let around = margin * cell;
         let wide = outline.framed(Frame {
             left: -i64::from(around),
@@ -140,7 +140,7 @@ impl CellOutline {
             width: size.width + 2 * around,
             height: size.height + 2 * around,
         });
-        let grown = if gap == 0 { wide } else { offset_one_bit(&wide, -f64::from(gap)) };
+        let grown = if gap == 0 { wide } else { grown_by_gap(&wide, [f64::from(gap); 2]) };
         Self { rows: cells(outline, cell), grown: cells(&grown, cell), margin: margin as i32 }
     }
 

@@ -33,19 +33,20 @@ fn pixels(layout: &Layout) -> Vec<Vec<[i32; 2]>> {
     copies.collect()
 }
 
-/// Checks pixel by pixel that copies are on the area, and so far apart.
+/// Checks pixel by pixel that copies are on the area, and so far apart from edge to edge.
 fn check(layout: &Layout, gap: u32) {
     let copies = pixels(layout);
     let area = layout.pixels();
-    let near = (f64::from(gap) + 0.5).powi(2);
     for (k, copy) in copies.iter().enumerate() {
         for &[column, row] in copy {
             assert!(
                 (0..area.width as i32).contains(&column) && (0..area.height as i32).contains(&row)
             );
             for &[x, y] in copies[..k].iter().flatten() {
-                let square = (x - column).pow(2) + (y - row).pow(2);
-                assert!(square > 0 && f64::from(square) > near, "{x} {y} {column} {row}");
+                assert!([x, y] != [column, row], "{x} {y}");
+                let between = [x - column, y - row].map(|by| (by.abs() - 1).max(0));
+                let square = between[0].pow(2) + between[1].pow(2);
+                assert!(square >= (gap as i32).pow(2), "{x} {y} {column} {row}");
             }
         }
     }
@@ -139,7 +140,12 @@ fn copies_keep_the_gap_to_the_edges() {
     // Three pixels, rounded up, and three copies in the 14 that are left.
     assert_eq!(count(2.5, "20x20mm").unwrap(), (9, Some(3)));
     assert!(count(8.5, "20x20mm").unwrap_err().to_string().contains("area of 2 x 2 (3x3mm)"));
-    assert!(matches!(count(1e9, "20x20mm"), Err(TileError::TooLarge { .. })));
+    let error = count(10.0, "20x30mm").unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "an edge gap of 10mm leaves nothing of the build area of 20x30mm"
+    );
+    assert!(matches!(count(1e9, "20x20mm"), Err(TileError::WideEdgeGap { .. })));
 }
 
 #[test]

@@ -84,6 +84,9 @@ fn within_edges(
     };
     let PixelSize { width, height } = layout.pixels();
     within.pixels = PixelSize { width: side(width), height: side(height) };
+    if edge > 0 && within.pixels.width.min(within.pixels.height) == 0 {
+        return Err(TileError::WideEdgeGap { edge_gap: how.edge_gap, area_mm: layout.area() });
+    }
     let Size { width, height } = layout.area();
     within.area = Size { width: length(width), height: length(height) };
     let mut placements = pack(&within)?;

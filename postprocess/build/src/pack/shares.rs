@@ -7,6 +7,12 @@
 
 use super::super::CopyPlacement;
 use super::job::{PackingJob, sum};
+use super::mix;
+
+/// The part of the work that is left, which the search for one number of copies may take.
+const PORTION: u64 = 3;
+/// Work below this part of all that a search may take finds nothing more.
+const LEAST_PORTION: u64 = 64;
 
 /// Places as many copies as fit, up to a limit, and at least one of each part if that is possible.
 pub(super) fn most(job: &mut PackingJob<'_>, shares: &[u32], limit: u32) -> Vec<CopyPlacement> {
@@ -33,12 +39,24 @@ pub(super) fn most(job: &mut PackingJob<'_>, shares: &[u32], limit: u32) -> Vec<
             step /= 2;
         }
     }
-    // Then copies that only the search finds room for.
+    // Then copies that only the search finds room for. All searches together take no more work
+    // than one of all copies.
+    let mut left = mix::MOST_WORK;
+    let mut search = |job: &mut PackingJob<'_>, counts: &[u32], found| {
+        let portion = left / PORTION;
+        let mut rest = portion;
+        if portion < mix::MOST_WORK / LEAST_PORTION {
+            return found;
+        }
+        let found = job.searched(counts, found, job.rows(), &mut rest);
+        left -= portion - rest;
+        found
+    };
     step = (most / 8).max(1);
     while step > 0 && most < limit {
         let next = (most + step).min(limit);
         let counts = order.counts(next);
-        let found = job.searched(&counts, Vec::new(), job.rows());
+        let found = search(job, &counts, Vec::new());
         if found.len() == sum(&counts) {
             (most, best) = (next, found);
         } else {
@@ -53,7 +71,7 @@ pub(super) fn most(job: &mut PackingJob<'_>, shares: &[u32], limit: u32) -> Vec<
         let counts = order.counts(next);
         let mut found = job.simply_placed(&counts);
         if found.len() < sum(&counts) {
-            found = job.searched(&counts, found, job.rows());
+            found = search(job, &counts, found);
         }
         if found.len() < sum(&counts) {
             break;
@@ -83,14 +101,15 @@ impl Order {
     }
 
     /// Returns the number of copies of each part among the first `copies`, or one where there is no
-    /// copy.
+    /// copy of a part that has a share.
     fn counts(&mut self, copies: u32) -> Vec<u32> {
         while self.parts.len() < copies as usize {
             self.grow();
         }
         let mut counts = vec![0; self.shares.len()];
         self.parts[..copies as usize].iter().for_each(|&part| counts[part] += 1);
-        counts.into_iter().map(|count| count.max(1)).collect()
+        let least = self.shares.iter().map(|&share| u32::from(share > 0));
+        counts.into_iter().zip(least).map(|(count, least): (u32, u32)| count.max(least)).collect()
     }
 
     /// Adds the copy that is due first: of the parts that are not ahead, the one that is too late
@@ -206,6 +225,33 @@ mod tests {
             }
             let thrice: Vec<u32> = shares.iter().map(|share| 3 * share).collect();
             prop_assert_eq!(counts, thrice);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+        #[test]
+        fn a_mix_that_does_not_fit_has_its_shares_and_more_where_there_is_room(
+            shares in prop::collection::vec(1u32..4, 3),
+            (width, height) in (16u32..34, 16u32..34),
+            outlines in any::<bool>(),
+        ) {
+            let parts = [
+                part(&["#####", "#....", "#...."]),
+                part(&["##", "##"]),
+                part(&["####", "#..#", "#..#", "####"]),
+            ];
+            let by = if outlines { PackBy::Outlines } else { PackBy::Boxes };
+            let pack = Pack { by, turns: Turns::Quarters, ..Pack::default() };
+            let area = format!("{width}x{height}mm");
+            // The area has less than 60 times the pixels of the smallest round.
+            let wanted: Vec<u32> = shares.iter().map(|share| 60 * share).collect();
+            let shared = packed(&parts, &wanted, &area, Pack { shares: true, ..pack }).unwrap();
+            let filled = packed(&parts, &wanted, &area, pack).unwrap();
+            for (part, (count, shared)) in filled.iter().zip(&shared).enumerate() {
+                prop_assert!(count >= shared && *count <= wanted[part], "{:?} {:?}", filled, shared);
+            }
+            prop_assert!(filled.iter().sum::<u32>() < wanted.iter().sum());
         }
     }
 

@@ -26,7 +26,7 @@ pub use recipe_error::RecipeError;
 
 /// Changes when [`Layout::build`] makes other pages of the same parts and options: a recipe is for
 /// one number.
-pub const TILE_CODE: u32 = 6;
+pub const TILE_CODE: u32 = 7;
 
 /// The form of the text.
 const SCHEMA: &str = "lamp-recipe-1";

@@ -3,6 +3,7 @@ use proptest::prelude::*;
 
 use super::super::super::testing::{layer, mask_of};
 use super::super::super::{Layout, Pack, PackBy, PartStack, TileError, Turns};
+use super::super::Way;
 use super::super::greedy::{self, PlacingRule};
 use super::super::no_fit::NoFitRegions;
 use super::depth::DepthMap;

@@ -18,28 +18,27 @@ mod slide;
 mod ways;
 
 use super::super::{CopyPlacement, Layout};
-use super::Way;
 use board::PlacedCopy;
-use ways::Ways;
 
+pub(super) use ways::Ways;
+
+/// The additions and look-ups that a search may make at most.
+pub(super) const MOST_WORK: u64 = 4_000_000_000;
 /// More copies than these stay as they are.
 pub(super) const MOST_COPIES: usize = 512;
 /// Parts in more ways stay as they are, too: each two of them have depths of their own.
-const MOST_WAYS: usize = 256;
+pub(super) const MOST_WAYS: usize = 256;
 
 /// Returns the copies closer to the top, as far as the search gets, or until they take `enough`
-/// rows: never lower than they were.
+/// rows or no work is left: never lower than they were.
 pub(super) fn shorten(
     layout: &Layout,
     gap: u32,
-    ways: &[Vec<Way>],
+    ways: &Ways,
     placements: Vec<CopyPlacement>,
     enough: u32,
+    left_work: &mut u64,
 ) -> Vec<CopyPlacement> {
-    if ways.iter().map(Vec::len).sum::<usize>() > MOST_WAYS {
-        return placements;
-    }
-    let ways = Ways::new(layout, gap, ways);
     let left = placements.iter().map(|at| at.left).min().unwrap_or(0);
     let top = placements.iter().map(|at| at.top).min().unwrap_or(0);
     // To the nearest cell; the search begins by separating copies that overlap then.
@@ -49,8 +48,9 @@ pub(super) fn shorten(
         PlacedCopy { part, way, at: [cells(at.left - left), cells(at.top - top)] }
     };
     let copies: Vec<PlacedCopy> = placements.iter().map(copy).collect();
-    let Some(found) = search::lowest(layout, &ways, &copies, enough) else { return placements };
-    let shorter = slide::up(layout, gap, &ways, &found);
+    let found = search::lowest(layout, ways, &copies, enough, left_work);
+    let Some(found) = found else { return placements };
+    let shorter = slide::up(layout, gap, ways, &found);
     if height(layout, &shorter) < height(layout, &placements) { shorter } else { placements }
 }
 

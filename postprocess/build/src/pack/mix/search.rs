@@ -1,17 +1,17 @@
 //! Makes the area lower, and the copies keep apart.
 
 use super::super::super::Layout;
+use super::MOST_WORK;
 use super::board::{Board, PlacedCopy};
 use super::random::Random;
 use super::separate::separate;
 use super::ways::Ways;
 
 /// The additions and look-ups that the search may make: for each copy, for each cell of the area
-/// that the copies take at first, and at most. They are counted, not timed, so that every machine
-/// finds the same layout.
+/// that the copies take at first. They are counted, not timed, so that every machine finds the same
+/// layout.
 const WORK_OF_COPY: u64 = 100_000_000;
 const WORK_OF_CELL: u64 = 20_000;
-const MOST_WORK: u64 = 4_000_000_000;
 /// The part of the work, in tenths, in which copies change places where they find no room.
 const EXPLORING: u64 = 7;
 /// The number of layouts with the least overlap that are kept to start from.
@@ -31,22 +31,25 @@ struct LayoutSearch<'a> {
 }
 
 /// Returns copies as close to the top as the search finds, or as is enough, or nothing if it never
-/// separates them.
+/// separates them. Takes what it does from the work that is left.
 pub(super) fn lowest(
     layout: &Layout,
     ways: &Ways,
     copies: &[PlacedCopy],
     enough: u32,
+    left: &mut u64,
 ) -> Option<Vec<PlacedCopy>> {
     let area = layout.pixels();
     let cells = |pixels: u32| u64::from(pixels.div_ceil(ways.cell));
     let cells = cells(area.width) * cells(bottom(ways, copies));
-    let work = MOST_WORK.min(WORK_OF_COPY * copies.len() as u64).min(WORK_OF_CELL * cells);
+    let work = WORK_OF_COPY * copies.len() as u64;
+    let work = MOST_WORK.min(work).min(WORK_OF_CELL * cells).min(*left);
     let mut board = Board::new(ways, [area.width, area.height], copies);
     // A fixed seed gives the same layout on every run.
     let mut random = Random(1);
     // Rounded to cells, copies overlap a little.
     if !separate(&mut board, &mut random, work) {
+        *left = left.saturating_sub(board.work);
         return None;
     }
     let best = board.copies.clone();
@@ -58,6 +61,7 @@ pub(super) fn lowest(
         search.step = search.step.min(search.height - least);
         search.go_on();
     }
+    *left = left.saturating_sub(search.board.work);
     Some(search.best)
 }
 

@@ -14,7 +14,7 @@ const CELLS: u32 = 160;
 const MOST_DEPTHS: f64 = 6e7;
 
 /// All ways of all parts.
-pub(super) struct Ways {
+pub(in super::super) struct Ways {
     all: Vec<(Way, PixelSize)>,
     /// The ways of each part.
     pub(super) of_part: Vec<Vec<usize>>,
@@ -26,7 +26,7 @@ pub(super) struct Ways {
 }
 
 impl Ways {
-    pub(super) fn new(layout: &Layout, gap: u32, ways: &[Vec<Way>]) -> Self {
+    pub(in super::super) fn new(layout: &Layout, gap: u32, ways: &[Vec<Way>]) -> Self {
         let (all, of_part) = distinct(layout, ways);
         let (cell, fine) = cells(layout, &all);
         let every = cell / fine;
