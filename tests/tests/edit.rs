@@ -509,6 +509,43 @@ fn an_edit_that_changes_no_pixel_gets_a_warning() {
     assert!(pixels > 40 * 1200);
 }
 
+#[test]
+fn an_edit_that_changes_nothing_is_a_finding_with_strict() {
+    let scratch = with_cube();
+    let list = |z: &str, diameter: &str| {
+        format!(
+            "[[edit]]\nop = \"subtract\"\nz = [\"0mm\", \"5mm\"]\n\
+             cylinder = {{ at = [\"0mm\", \"0mm\"], diameter = \"14mm\" }}\n\n\
+             [[edit]]\nop = \"subtract\"\nz = [{z}]\n\
+             cylinder = {{ at = [\"0mm\", \"0mm\"], diameter = \"{diameter}\" }}\n"
+        )
+    };
+    // Above the cube, and in its own hole.
+    let cases = [
+        (list("\"30mm\", \"40mm\"", "14mm"), "edit 2 applies to no layer", 0),
+        (list("\"5mm\", \"10mm\"", "4mm"), "edit 2 changes no pixel", 10),
+    ];
+    for (list, says, layers) in cases {
+        scratch.write("none.toml", list.as_bytes());
+        let line = "lamp edit cube.tif none.toml --strict --report edit.json -o out.tif --force";
+        let ran = scratch.run(line);
+        assert!(ran.statuses == [Some(3)] && ran.stderr.contains(says), "{ran:?}");
+        assert!(!ran.stderr.contains("edit 1") && !ran.stderr.contains("warning"), "{ran:?}");
+        assert!(!scratch.path("out.tif").exists());
+        let report: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(scratch.path("edit.json")).unwrap()).unwrap();
+        assert_eq!(report["edits"][1]["layers"], layers);
+        assert_eq!(report["edits"][1]["pixels"], 0);
+        assert!(report["edits"][0]["pixels"].as_u64().unwrap() > 0);
+        let ran = scratch.run("lamp edit cube.tif none.toml --strict | lamp convert - -o out.tif");
+        assert!(ran.statuses[0] == Some(3) && ran.statuses[1] != Some(0), "{ran:?}");
+        assert!(!scratch.path("out.tif").exists());
+    }
+    let list = list("\"5mm\", \"10mm\"", "14mm");
+    scratch.write("some.toml", list.as_bytes());
+    scratch.run("lamp edit cube.tif some.toml --strict -o out.tif").succeeds_quietly();
+}
+
 /// A PBM of a plus sign, in which 1 is black, and a BMP of the same in 256 levels of gray.
 fn plus_signs() -> (Vec<u8>, Vec<u8>) {
     let is_white = |column: u32, row: u32| column == 1 || row == 1;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_edit::EditError;
-use lamp_pipeline::edit::{EditSettings, Editing, variants};
+use lamp_pipeline::edit::{EditCount, EditSettings, Editing, variants};
 
 use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::EditStageArgs;
@@ -13,9 +13,9 @@ use crate::output::json_report::{JsonReport, ReportTo, schemas};
 use crate::output::numbers::number_of;
 use crate::streams::{
     check_beside, check_not_input, extension, input_name, is_stream, progress, read_passing,
-    write_file, write_layers,
+    unless_found, write_file, write_layers,
 };
-use crate::terminal::stack_notes::noting;
+use crate::terminal::stack_notes::{doubts, noting};
 
 /// Edit the images of a part, without slicing it again
 ///
@@ -60,6 +60,11 @@ pub(crate) struct EditArgs {
 
     #[command(flatten)]
     report: ReportTo,
+
+    /// Stop with status 3 if an edit applies to no layer or changes no pixel, or if pages of a
+    /// folder may be missing: no stack is written, and the next stage of a pipe fails, too
+    #[arg(long)]
+    strict: bool,
 
     #[command(flatten)]
     output: Output,
@@ -146,7 +151,13 @@ fn make(
     let mut layer_count = 0;
     let layers = read_passing(&args.input, &progress)?.inspect(|_| layer_count += 1);
     let edited = editing.layers(layers, 0..u32::MAX, is_whole, &noting)?;
-    write_layers(edited, output, &progress).map_err(|error| match error {
+    let warnings = || {
+        let all: Vec<String> = editing.counts().iter().filter_map(EditCount::warning).collect();
+        (!all.is_empty()).then(|| all.join("; "))
+    };
+    let finding = || warnings().or_else(doubts).filter(|_| args.strict).map(Exit::Findings);
+    let edited = unless_found(edited, finding);
+    let written = write_layers(edited, output, &progress).map_err(|error| match error {
         // A page that cannot be decoded names its stack.
         error if matches!(error.cause(), Some(EditError::Page(_))) => error,
         Exit::Failed(error) => match (error.downcast_ref::<EditError>(), editing.list()) {
@@ -155,18 +166,24 @@ fn make(
             (None, _) => Exit::Failed(error),
         },
         error => error,
-    })?;
+    });
+    // After a finding, the report still shows it.
+    if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
+        return written;
+    }
     let counts = editing.counts();
     for count in &counts {
         let pixels = number_of(count.pixels, "pixel");
         let layers = number_of(count.layers as u64, "layer");
         progress.detail(&format!("edit {}: {pixels} changed in {layers}", count.edit));
-        count.warning().iter().for_each(|warning| progress.warn(warning));
+        // With --strict, the error says it.
+        let warning = count.warning().filter(|_| !args.strict);
+        warning.iter().for_each(|warning| progress.warn(warning));
     }
-    match report {
-        Some(path) => JsonReport::of_schema("lamp-edit-1", &editing.head(layer_count))
+    if let Some(path) = report {
+        JsonReport::of_schema("lamp-edit-1", &editing.head(layer_count))
             .list("edits", counts)
-            .write(path),
-        None => Ok(()),
+            .write(path)?;
     }
+    written
 }
